@@ -1,0 +1,202 @@
+"""Uniform B-splines over time: evaluation, derivative control points, splicing, fitting.
+
+The curve of degree p with control points Q_0 .. Q_{n-1} and knot spacing dt is
+Phi(t) = sum_i Q_i B_{i,p}(t) (paper, Sec. III-B; de Boor, *A Practical Guide to Splines*, ch. IX).
+Its span is [t_start, t_start + (n - p) dt]: there p + 1 basis functions are alive, and the convex
+hull property holds. Control point i acts around its Greville time
+t_start + (i - (p - 1) / 2) dt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import comb, factorial
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.types import Array, Curve, FrenetTrajectory, frozen
+
+__all__ = [
+    "UniformBSpline",
+    "basis_matrix",
+    "bernstein_matrix",
+    "derivative_matrix",
+    "fit_to_curve",
+    "n_points_for",
+    "segment_matrix",
+    "splice_points",
+]
+
+
+@lru_cache(maxsize=16)
+def segment_matrix(degree: int) -> Array:
+    """Monomial coefficients (p+1, p+1) of the uniform basis on one segment.
+
+    ``[1, u, .., u^p] @ M`` are the values at u in [0, 1] of the p + 1 living basis functions
+    (Qin, *General matrix representations for B-splines*, 2000).
+    """
+    p = degree
+    matrix = np.zeros((p + 1, p + 1))
+    for i in range(p + 1):
+        for j in range(p + 1):
+            total = sum((-1) ** (k - j) * comb(p + 1, k - j) * (p - k) ** (p - i) for k in range(j, p + 1))
+            matrix[i, j] = comb(p, p - i) * total / factorial(p)
+    return frozen(matrix)
+
+
+@lru_cache(maxsize=16)
+def bernstein_matrix(degree: int) -> Array:
+    """Linear map (p+1, p+1) from a segment's B-spline control points to its Bernstein ones.
+
+    Both sets span the same polynomial; the Bernstein hull is the tighter one.
+    """
+    p = degree
+    to_bernstein = np.array([[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)])
+    return frozen(to_bernstein @ segment_matrix(p))
+
+
+@lru_cache(maxsize=64)
+def derivative_matrix(n: int, order: int, spacing: float) -> Array:
+    """Matrix (n - order, n) that maps control points to those of the derivative (paper, eq. v_a_j)."""
+    matrix = np.eye(n)
+    for _ in range(order):
+        matrix = np.diff(matrix, axis=0) / spacing
+    return frozen(matrix)
+
+
+def n_points_for(duration: float, spacing: float, degree: int) -> int:
+    """Number of control points whose span covers ``duration`` (at least one segment)."""
+    return max(1, int(np.ceil(duration / spacing - 1e-9))) + degree
+
+
+def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order: int = 0) -> Array:
+    """Values (K, n) of the ``order``-th derivative of every basis function.
+
+    Parameters
+    ----------
+    tau : (K,) array_like
+        Times since ``t_start`` [s]; values outside of the span use the outermost polynomial.
+    """
+    where = np.asarray(tau, dtype=np.float64) / spacing
+    segment = np.clip(np.floor(where + 1e-9), 0, n - degree - 1).astype(np.intp)
+    u = where - segment
+    powers = np.zeros((len(u), degree + 1))
+    for k in range(order, degree + 1):
+        powers[:, k] = factorial(k) / factorial(k - order) * u ** (k - order)
+    local = powers @ segment_matrix(degree) / spacing**order
+    matrix = np.zeros((len(u), n))
+    np.put_along_axis(matrix, segment[:, None] + np.arange(degree + 1), local, axis=1)
+    return matrix
+
+
+@lru_cache(maxsize=256)
+def _sampling(times: bytes, n: int, degree: int, spacing: float) -> Array:
+    tau = np.frombuffer(times)
+    return frozen(np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)]))
+
+
+@dataclass(frozen=True)
+class UniformBSpline:
+    """A uniform B-spline trajectory in the Frenet frame; implements :class:`repair.types.Curve`.
+
+    Attributes
+    ----------
+    t_start : float
+        Start of the span [s].
+    spacing : float
+        Knot spacing [s].
+    degree : int
+    points : (n, 2) array
+        Control points ``[s, l]`` [m], n > degree.
+    """
+
+    t_start: float
+    spacing: float
+    degree: int
+    points: Array
+
+    @property
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        return self.t_start + (len(self.points) - self.degree) * self.spacing
+
+    @property
+    def greville(self) -> Array:
+        """Time (n,) at which each control point acts [s]."""
+        return self.t_start + (np.arange(len(self.points)) - (self.degree - 1) / 2) * self.spacing
+
+    def derivative_points(self, order: int) -> Array:
+        """Control points (n - order, 2) of the derivative curve; their hull bounds it."""
+        return np.diff(self.points, n=order, axis=0) / self.spacing**order
+
+    def segments(self) -> Array:
+        """Control points of each segment, (n - p, p + 1, 2)."""
+        windows = np.lib.stride_tricks.sliding_window_view(self.points, self.degree + 1, axis=0)
+        return np.asarray(np.swapaxes(windows, 1, 2))
+
+    def bernstein_segments(self) -> Array:
+        """Bernstein control points of each segment, (n - p, p + 1, 2)."""
+        return np.asarray(np.einsum("ij,kjd->kid", bernstein_matrix(self.degree), self.segments()))
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate position and three derivatives; beyond the span the end speed is held."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        tau = np.clip(times - self.t_start, 0.0, self.t_end - self.t_start)
+        # Probes ask for the same offsets over and over; the matrices are worth keeping.
+        rounded = np.round(tau, 12)
+        stacked = _sampling(rounded.tobytes(), len(self.points), self.degree, self.spacing) @ self.points
+        position, velocity, acceleration, jerk = (a.copy() for a in np.split(stacked, 4))
+        beyond = times - self.t_start - tau
+        out = np.abs(beyond) > 1e-9
+        if out.any():
+            position[out] += beyond[out, None] * velocity[out]
+            acceleration[out] = 0.0
+            jerk[out] = 0.0
+        return FrenetTrajectory(times, position, velocity, acceleration, jerk)
+
+
+@lru_cache(maxsize=64)
+def _start_inverse(degree: int, spacing: float) -> Array:
+    rows = [basis_matrix([0.0], degree + 1, degree, spacing, k)[0, :degree] for k in range(degree)]
+    return frozen(np.linalg.inv(np.array(rows)))
+
+
+def splice_points(derivatives: npt.ArrayLike, degree: int, spacing: float) -> Array:
+    """First ``degree`` control points (p, 2) that give the curve these derivatives at its start.
+
+    Parameters
+    ----------
+    derivatives : (p, 2) array_like
+        Position, velocity, acceleration, ... at ``t_start``. At a knot only p control points are
+        alive, so the first p of them are the start state, no more and no less.
+    """
+    return _start_inverse(degree, spacing) @ np.asarray(derivatives, dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _fit_operator(n: int, degree: int, spacing: float, per_segment: int) -> tuple[Array, Array, Array]:
+    tau = np.linspace(0.0, (n - degree) * spacing, (n - degree) * per_segment + 1)
+    basis = basis_matrix(tau, n, degree, spacing)
+    # A whisper of smoothing keeps the last, hardly observed control points on the polynomial.
+    ridge = 1e-6 * derivative_matrix(n, degree, 1.0)
+    stacked = np.vstack([basis, ridge])
+    free = np.linalg.pinv(stacked[:, degree:])
+    return frozen(tau), frozen(free[:, : len(tau)]), frozen(free @ stacked[:, :degree])
+
+
+def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: float) -> UniformBSpline:
+    """Least-squares spline through ``curve`` from ``t_start`` on, with its exact state there.
+
+    Position, velocity and acceleration at ``t_start`` are reproduced exactly (and the jerk for
+    degree 4 and up); the remaining control points fit the positions.
+    """
+    tau, operator, correction = _fit_operator(n, degree, spacing, 4)
+    samples = curve.sample(t_start + tau)
+    state = np.zeros((degree, 2))
+    known = (samples.position[0], samples.velocity[0], samples.acceleration[0], samples.jerk[0])
+    state[: min(4, degree)] = known[: min(4, degree)]
+    head = splice_points(state, degree, spacing)
+    tail = operator @ samples.position - correction @ head
+    return UniformBSpline(t_start, spacing, degree, frozen(np.vstack([head, tail])))

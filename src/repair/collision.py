@@ -1,0 +1,422 @@
+"""Collision with obstacles and with the edge of the road, for the ego's oriented rectangle.
+
+The verdicts are at least as strict as those of the drivability checker
+(``commonroad_dc.feasibility.solution_checker``), which looks at scenario steps only. The tests are
+the project's own (separating axes in numpy): they need no build and name obstacle and time at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.types import Array
+
+if TYPE_CHECKING:
+    from repair.scene.obstacles import Obstacle
+    from repair.scene.vehicle import Vehicle
+
+__all__ = ["CollisionWorld", "Contact", "RoadBoundary", "official_shifts"]
+
+# Shapes closer than this [m] count as touching: rounding must not make us laxer than pycrcc.
+_TOUCH = 1e-6
+
+
+class Contact(NamedTuple):
+    """First contact: time [s], the obstacle, and whether that obstacle strikes from behind."""
+
+    time: float
+    obstacle_id: int
+    from_behind: bool
+
+
+def official_shifts(scenario: Any) -> dict[int, int]:
+    """By how many steps the drivability checker is late, for the obstacles where it is not on time.
+
+    ``commonroad_dc.create_collision_object`` takes the initial state as the first occupancy and
+    appends those of the prediction, whatever the prediction's own first time step.
+    """
+    shifts = {}
+    for obstacle in scenario.dynamic_obstacles:
+        occupancies = obstacle.prediction.occupancy_set if obstacle.prediction is not None else ()
+        if not occupancies:
+            continue
+        first = occupancies[0].time_step  # of a set this may be an interval
+        placed = obstacle.initial_state.time_step + 1
+        if not getattr(first, "start", first) <= placed <= getattr(first, "end", first):
+            shifts[obstacle.obstacle_id] = int(placed - getattr(first, "start", first))
+    return shifts
+
+
+class CollisionWorld:
+    """The obstacles over time, built once, asked many times.
+
+    Rectangles and circles are interpolated between the scenario steps (centre, heading and size linear
+    in time). Sets and polygons hold over the intervals on both sides of their step.
+
+    Parameters
+    ----------
+    obstacles : sequence of Obstacle
+        Arrays of ``n_steps + 1`` rows.
+    vehicle : Vehicle
+        The ego.
+    dt : float
+        Scenario time step [s].
+    n_steps : int
+        Index of the last scenario step.
+    substeps : int
+        Samples per scenario step.
+    shifts : mapping, optional
+        Obstacle id -> steps by which the drivability checker is late (:func:`official_shifts`). Such
+        obstacles are tested both where they are and, at scenario steps, where the checker puts them.
+    """
+
+    def __init__(
+        self,
+        obstacles: Sequence[Obstacle],
+        vehicle: Vehicle,
+        dt: float,
+        n_steps: int,
+        substeps: int = 4,
+        shifts: Mapping[int, int] | None = None,
+    ) -> None:
+        self.dt = dt
+        self.substeps = substeps
+        self.n_samples = n_steps * substeps + 1
+        self._obstacles = tuple(obstacles)
+        self._half = (0.5 * vehicle.length, 0.5 * vehicle.width)
+        sample = np.arange(self.n_samples)
+        self._before = sample // substeps
+        self._after = -(-sample // substeps)
+        self._build(shifts or {}, float(np.hypot(*self._half)))
+
+    def _build(self, shifts: Mapping[int, int], ego_radius: float) -> None:
+        """Tabulate every shape's pose and reach over the samples.
+
+        Columns are tracks: an obstacle gives one, or two where it is held over intervals or where the
+        drivability checker is late. Circles and polygons have the size of their circumcircle.
+        """
+        tracks: list[Array] = []  # (S, 5)
+        owner: list[int] = []
+        kind: list[int] = []
+        steps: list[npt.NDArray[np.intp]] = []  # which scenario step's polygons hold, (S,)
+
+        def add(index: int, track: Array, what: int, step: npt.NDArray[np.intp]) -> None:
+            tracks.append(track)
+            owner.append(index)
+            kind.append(what)
+            steps.append(step)
+
+        for index, obstacle in enumerate(self._obstacles):
+            what, rows = _rows(obstacle)
+            if what == _POLYGON or obstacle.role == "set_based":
+                add(index, rows[self._before], what, self._before)
+                add(index, rows[self._after], what, self._after)
+            else:
+                add(index, self._interpolate(rows), what, self._before)
+            shift = shifts.get(obstacle.id, 0) if obstacle.role != "static" else 0
+            if shift:
+                late = self._before - shift
+                track = rows[np.clip(late, 0, len(rows) - 1)]
+                track[(late < 0) | (late >= len(rows)) | (self._before != self._after)] = np.nan
+                add(index, track, what, np.clip(late, 0, len(rows) - 1))
+
+        self._track = np.stack(tracks, axis=1) if tracks else np.empty((self.n_samples, 0, 5))
+        self._owner = np.array(owner, dtype=np.intp)
+        self._kind = np.array(kind, dtype=np.intp)
+        self._step = steps
+        self._x = np.ascontiguousarray(self._track[:, :, 0])
+        self._y = np.ascontiguousarray(self._track[:, :, 1])
+        radius = np.hypot(self._track[:, :, 3], self._track[:, :, 4])
+        radius = np.where(self._kind == _RECTANGLE, radius, self._track[:, :, 3])
+        self._reach = (radius + ego_radius + _TOUCH) ** 2
+
+    def _interpolate(self, rows: Array) -> Array:
+        """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
+        weight = (np.arange(self.n_samples) % self.substeps / self.substeps)[:, None]
+        left, right = rows[self._before], rows[self._after]
+        change = right - left
+        change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+        return np.where(weight > 0.0, left + weight * change, left)
+
+    def first_collision(self, x: Array, y: Array, orientation: Array, start: int = 0) -> tuple[float, int] | None:
+        """Time [s] and obstacle id of the first collision, or None; arguments as in :meth:`contact`."""
+        found = self._first(x, y, orientation, start)
+        if found is None:
+            return None
+        return (start + found[0]) * self.dt / self.substeps, self._obstacles[found[1]].id
+
+    def contact(self, x: Array, y: Array, orientation: Array, start: int = 0) -> Contact | None:
+        """First contact of the ego's rectangle with an obstacle.
+
+        Parameters
+        ----------
+        x, y, orientation : (K,) array
+            Centre [m] and orientation [rad] of the ego, ``substeps`` samples per scenario step.
+        start : int
+            Sample number of the first of them, counted from the start of the scenario.
+
+        Returns
+        -------
+        Contact or None
+            ``from_behind``: the obstacle's centre lies behind the middle of the ego's rear half, and
+            along the ego's axis it is the obstacle that closes in.
+
+        Raises
+        ------
+        ValueError
+            If the samples reach beyond the scenario or are not finite.
+        """
+        found = self._first(x, y, orientation, start)
+        if found is None:
+            return None
+        k, index = found
+        axis = np.array([np.cos(orientation[k]), np.sin(orientation[k])])
+        centre, velocity = self._motion(index, start + k)
+        ego = np.zeros(2)
+        if len(x) > 1:
+            i = max(k - 1, 0)
+            ego = np.array([x[i + 1] - x[i], y[i + 1] - y[i]]) * self.substeps / self.dt
+        behind = (centre - (x[k], y[k])) @ axis < -0.5 * self._half[0] and (velocity - ego) @ axis > 0.0
+        return Contact((start + k) * self.dt / self.substeps, self._obstacles[index].id, bool(behind))
+
+    def _motion(self, index: int, sample: int) -> tuple[Array, Array]:
+        """Centre and velocity of an obstacle at a sample."""
+        states = self._obstacles[index].states
+        low, high = int(self._before[sample]), int(self._after[sample])
+        weight = sample % self.substeps / self.substeps
+        centre = states[low, :2] if low == high else (1 - weight) * states[low, :2] + weight * states[high, :2]
+        first = min(low, len(states) - 2) if len(states) > 1 else 0
+        velocity = np.zeros(2) if len(states) < 2 else (states[first + 1, :2] - states[first, :2]) / self.dt
+        if not np.isfinite(velocity).all():
+            heading, speed = states[low, 2:4]
+            velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+        return centre, velocity
+
+    def _first(self, x: Array, y: Array, orientation: Array, start: int) -> tuple[int, int] | None:
+        """Sample (counted from ``start``) and obstacle index of the first collision."""
+        rows = slice(start, start + len(x))
+        if start < 0 or rows.stop > self.n_samples:
+            raise ValueError(f"samples {start} to {rows.stop} of a world of {self.n_samples}")
+        if not (np.isfinite(x).all() and np.isfinite(y).all() and np.isfinite(orientation).all()):
+            raise ValueError("the ego's poses are not finite")
+        dx = self._x[rows] - x[:, None]
+        dy = self._y[rows] - y[:, None]
+        k, m = np.nonzero(dx * dx + dy * dy <= self._reach[rows])
+        if not len(k):
+            return None
+        poses = self._track[rows][k, m]
+        kind = self._kind[m]
+        cos, sin = np.cos(orientation[k]), np.sin(orientation[k])
+        forward = cos * dx[k, m] + sin * dy[k, m]
+        left = cos * dy[k, m] - sin * dx[k, m]
+        hit = _rectangles_touch(forward, left, poses[:, 2] - orientation[k], self._half, poses[:, 3], poses[:, 4])
+        if (kind != _RECTANGLE).any():
+            beyond = np.hypot(
+                np.maximum(np.abs(forward) - self._half[0], 0.0), np.maximum(np.abs(left) - self._half[1], 0.0)
+            )
+            hit = np.where(kind == _RECTANGLE, hit, beyond <= poses[:, 3] + _TOUCH)
+            for i in np.flatnonzero(hit & (kind == _POLYGON)):
+                step = self._step[m[i]][start + k[i]]
+                pose = (x[k[i]], y[k[i]], cos[i], sin[i])
+                hit[i] = any(
+                    _polygon_touches(polygon, pose, self._half)
+                    for polygon in self._obstacles[self._owner[m[i]]].polygons[step]
+                )
+                if hit[i]:
+                    break
+        if not hit.any():
+            return None
+        first = int(np.argmax(hit))
+        return int(k[first]), int(self._owner[m[first]])
+
+
+_RECTANGLE, _CIRCLE, _POLYGON = range(3)
+
+
+def _rows(obstacle: Obstacle) -> tuple[int, Array]:
+    """What an obstacle is made of, and (T, 5) ``x, y, heading, half length, half width``.
+
+    Circles, and the circumcircles of polygons, have their radius as half length.
+    """
+    if obstacle.rectangles is not None:
+        return _RECTANGLE, np.asarray(obstacle.rectangles)
+    rows = np.full((obstacle.n_steps + 1, 5), np.nan)
+    if obstacle.circles is not None:
+        rows[:, :2] = obstacle.circles[:, :2]
+        rows[:, 3] = rows[:, 4] = obstacle.circles[:, 2]
+        rows[:, 2] = 0.0
+        return _CIRCLE, rows
+    for step, polygons in enumerate(obstacle.polygons[: len(rows)]):
+        if polygons:
+            points = np.concatenate(polygons)
+            centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            radius = np.hypot(*(points - centre).T).max()
+            rows[step] = (*centre, 0.0, radius, radius)
+    return _POLYGON, rows
+
+
+def _rectangles_touch(
+    forward: Array, left: Array, turn: Array, half: tuple[float, float], length: Array, width: Array
+) -> npt.NDArray[np.bool_]:
+    """Whether the ego and rectangles meet: separating axes, all arguments (n,).
+
+    ``forward``, ``left`` and ``turn`` give the other rectangle's pose seen from the ego, ``length`` and
+    ``width`` its half sizes.
+    """
+    cos, sin = np.cos(turn), np.sin(turn)
+    along, across = np.abs(cos), np.abs(sin)
+    return np.asarray(
+        (np.abs(forward) <= half[0] + length * along + width * across + _TOUCH)
+        & (np.abs(left) <= half[1] + length * across + width * along + _TOUCH)
+        & (np.abs(cos * forward + sin * left) <= length + half[0] * along + half[1] * across + _TOUCH)
+        & (np.abs(cos * left - sin * forward) <= width + half[0] * across + half[1] * along + _TOUCH)
+    )
+
+
+def _polygon_touches(
+    polygon: Array, pose: tuple[float, float, float, float], half: tuple[float, float]
+) -> bool:
+    """Whether the ego at ``x, y, cos, sin`` meets a convex polygon (V, 2): separating axes."""
+    x, y, cos, sin = pose
+    points = (polygon - (x, y)) @ np.array([[cos, -sin], [sin, cos]])  # seen from the ego
+    if (points.min(axis=0) > np.add(half, _TOUCH)).any() or (points.max(axis=0) < -np.add(half, _TOUCH)).any():
+        return False
+    edges = np.roll(points, -1, axis=0) - points
+    size = np.hypot(edges[:, 0], edges[:, 1])
+    normals = np.column_stack((-edges[:, 1], edges[:, 0]))[size > 0] / size[size > 0, None]
+    projected = points @ normals.T
+    reach = np.abs(normals) @ np.asarray(half) + _TOUCH
+    return bool(((projected.min(axis=0) <= reach) & (projected.max(axis=0) >= -reach)).all())
+
+
+class RoadBoundary:
+    """The road as one region: the ego's rectangle must lie properly inside.
+
+    The region is the union of the lane sections, a section being a lanelet with all its lateral
+    neighbours; the drivability checker's triangulated boundary
+    (``solution_checker._construct_boundary_checker``) fills what is outside the same sections. That
+    triangulation needs the package ``triangle``, whose licence is not free; where it is installed,
+    :meth:`official_off_road` asks it as well.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+        Only read.
+    vehicle : Vehicle
+        The ego.
+    """
+
+    def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
+        import shapely
+
+        self._scenario = scenario
+        self._corners = 0.5 * np.array(
+            [[vehicle.length, vehicle.width], [-vehicle.length, vehicle.width],
+             [-vehicle.length, -vehicle.width], [vehicle.length, -vehicle.width]]
+        )  # fmt: skip
+        outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
+        self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
+        shapely.prepare(self.region)
+        self._triangles: Any = None
+
+    def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
+
+        Parameters
+        ----------
+        x, y, orientation : (K,) array
+            Centre [m] and orientation [rad] of the ego.
+        """
+        import shapely
+
+        inside = shapely.contains_properly(self.region, shapely.polygons(self._outline(x, y, orientation)))
+        return None if inside.all() else int(np.argmin(inside))
+
+    def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
+        """Whether the ego is off the road already at this pose."""
+        return self.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
+
+    def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
+        """Corners of the ego's rectangle, (K, 4, 2)."""
+        cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
+        forward, left = self._corners[:, 0], self._corners[:, 1]
+        return np.stack((x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left), axis=2)
+
+    def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """As :meth:`first_off_road`, by the drivability checker's triangulation (built at the first call).
+
+        The two differ only next to ends of the map: the triangulation has no edge across the end of a
+        section that has successors, and a triangle may reach into the road there. None also where the
+        triangulation cannot be had (:attr:`official_available`).
+        """
+        if not self.official_available:
+            return None
+        import shapely
+
+        hits = self._triangles.query(shapely.polygons(self._outline(x, y, orientation)), predicate="intersects")
+        return int(hits[0].min()) if hits.size else None
+
+    @property
+    def official_available(self) -> bool:
+        """Whether the drivability checker can triangulate this road: it fails on some, or lacks ``triangle``."""
+        if self._triangles is None:
+            import shapely
+            from commonroad_dc.boundary import construction
+
+            try:
+                parts = construction.construct(self._scenario, ["section_triangles", "triangulation"])
+            except Exception:  # whatever goes wrong in there, there is no triangulation to ask
+                self._triangles = False
+            else:
+                # As plain geometry: pycrcc objects that live until the interpreter's exit are reported as leaks.
+                corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
+                self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
+        return self._triangles is not False
+
+
+def _section_outlines(network: Any) -> list[Array]:
+    """Outline (V, 2) of every lane section: a lanelet with its lateral neighbours, right to left."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
+    left_over = dict.fromkeys(lanelets)
+    outlines = []
+    while left_over:
+        first, _ = left_over.popitem()
+        start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
+        chain = _neighbours(lanelets, *start, to_the_left=True)
+        for member, _ in chain:
+            left_over.pop(member, None)
+        lines = [_bound(lanelets[chain[0][0]], chain[0][1], left=False)]
+        lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
+        ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
+        starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
+        outlines.append(np.concatenate((lines[0], ends, lines[-1][::-1], starts)))
+    return outlines
+
+
+def _neighbours(
+    lanelets: Mapping[int, Any], lanelet_id: int, forward: bool, to_the_left: bool
+) -> list[tuple[int, bool]]:
+    """The lanelet and those beside it on one side, each with whether it runs in the chain's direction."""
+    chain = [(lanelet_id, forward)]
+    seen = {lanelet_id}
+    while True:
+        lanelet = lanelets[lanelet_id]
+        if forward == to_the_left:
+            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
+        else:
+            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
+        if lanelet_id not in lanelets or lanelet_id in seen:
+            return chain
+        forward = forward == bool(same)
+        chain.append((lanelet_id, forward))
+        seen.add(lanelet_id)
+
+
+def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
+    """Left or right bound (V, 2) of a lanelet, seen and ordered along the chain's direction."""
+    vertices = lanelet.left_vertices if left == forward else lanelet.right_vertices
+    return np.asarray(vertices[:: 1 if forward else -1, :2], dtype=np.float64)

@@ -1,0 +1,391 @@
+"""The configuration: one schema, presets, overrides. Unknown keys and wrong types are errors.
+
+The schema is a tree of dataclasses merged by OmegaConf: defaults < preset < file < ``key=value``
+overrides < the ``for_backend`` section of the chosen backend. A preset uses ``for_backend`` where a
+published setting belongs to one backend only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from repair.errors import ConfigError
+
+__all__ = ["Config", "load_config", "preset_names"]
+
+_PRESETS = Path(__file__).with_name("presets")
+
+
+@dataclass
+class SearchConfig:
+    """Algorithm 1."""
+
+    rule: str = "bisect"  # bisect | as_printed | scan
+    delta_t: float = 0.4  # resolution of the search grid [s]
+    upper: float | None = None  # upper end [s]; null: TTC
+    time_limit: float | None = None  # whole search [s]
+    sides: str = "best"  # best: every open side of passing is tried; first: the first feasible one
+
+
+@dataclass
+class SceneConfig:
+    """How the scenario is read."""
+
+    vehicle: int = 1  # CommonRoad vehicle type; 1 is the Ford Escort
+    planning_problem: int | None = None
+    horizon: float | None = None  # cap of the planning horizon [s]
+    after_prediction: str = "remove"  # remove | hold | constant_velocity
+    s_offset: float | None = None  # S_offset [m]; null: half the vehicle's length + 0.1
+    l_offset: float | None = None  # L_offset [m]; null: half the vehicle's width + 0.1
+
+
+@dataclass
+class ReferenceConfig:
+    """Where the reference trajectory comes from."""
+
+    source: str = "planner"  # planner | constant | accelerate | recorded | file
+    file: str | None = None  # CommonRoad solution file (source: file)
+    obstacle_id: int | None = None  # recorded obstacle (source: recorded); null: the recorded ego
+    awareness: str = "none"  # none | constant_velocity
+    desired_speed: float | None = None  # [m/s]; null: the larger of initial speed and speed limit
+    a_lat: float = 1.2  # lateral comfort on the path's curvature [m/s²]
+    a_min: float = -1.5  # comfort braking [m/s²]
+    a_max: float = 1.0  # comfort acceleration [m/s²]
+    progress: float = 0.1  # cost of 1 m/s below the desired speed, against (1 m/s²)² of acceleration
+    time_step: float = 1.0  # layer of the graph search [s]
+    speed_step: float = 0.25  # grid of the graph search [m/s]
+
+
+@dataclass
+class LimitsConfig:
+    """What a repaired trajectory may do; null means the vehicle's own limit."""
+
+    v_max: float | None = None
+    v_lat: float = 3.0
+    a_min: float | None = None
+    a_max: float | None = None
+    a_lat: float | None = None
+    a_total: float | None = None
+    j_lon: float = 60.0
+    j_lat: float = 60.0
+
+
+@dataclass
+class RepairConfig:
+    """The repair problem, the same for every backend."""
+
+    horizon: float | None = None  # end of the repair [s]; null: TTC + after_conflict
+    after_conflict: float = 3.0  # [s]
+    clearance: float = 0.3  # the paper's s_f [m]
+    margin: float = 0.1  # distance hard backends keep from the inflated box [m]
+    lateral: str = "road"  # none | lane | same_direction | road
+    degree: int = 3
+    spacing: float = 0.2  # knot spacing [s]
+
+
+@dataclass
+class DeformWeights:
+    """lambda_s, lambda_c, lambda_d."""
+
+    smooth: float = 1.0
+    collision: float = 15.0
+    feasible: float = 1.0
+
+
+@dataclass
+class RefineWeights:
+    """lambda_s, lambda_d, lambda_f."""
+
+    smooth: float = 1.0
+    feasible: float = 1.0
+    fit: float = 0.01
+
+
+@dataclass
+class EgoConfig:
+    """The paper's two-stage soft optimisation."""
+
+    deform: DeformWeights = field(default_factory=DeformWeights)
+    refine: RefineWeights = field(default_factory=RefineWeights)
+    w_v: float = 1.0
+    w_a: float = 1.0
+    w_j: float = 1.0
+    elastic: float = 0.95  # the paper's lambda
+    joint: float = 1.5  # c_j as a multiple of c_m
+    reverse: float = 20000.0  # weight of speeds below zero
+    max_iterations: int = 100
+    tolerance: float = 0.01
+    rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
+    precondition: bool = True
+
+
+@dataclass
+class CasadiConfig:
+    """The hard-constraint NLP."""
+
+    solver: str = "ipopt"  # ipopt | sqpmethod
+    obstacles: str = "hull"  # hull | sampled
+    hull: str = "bernstein"
+    w_acceleration: float = 1.0
+    w_jerk: float = 0.1
+    w_reference: float = 0.05
+    max_iterations: int = 200
+    tolerance: float = 1e-8
+
+
+@dataclass
+class QptrConfig:
+    """The Bernstein QP baseline."""
+
+    solver: str = "osqp"
+    degree: int = 5
+    spacing: float = 0.5
+    w_jerk: float = 1.0
+    w_deviation: float = 0.1
+
+
+@dataclass
+class CheckerConfig:
+    """The feasibility check."""
+
+    substeps: int = 4  # samples per scenario step between which nothing is looked at
+    official: str = "leftover"  # leftover | always | never
+    road: bool = True
+    limits: bool = True
+
+
+@dataclass
+class Config:
+    """Everything that can be set."""
+
+    scenario: str | None = None
+    driver: str = "f_ttr"  # f_ttr | at_ttr
+    backend: str = "ego"
+    seed: int = 0
+    search: SearchConfig = field(default_factory=SearchConfig)
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    reference: ReferenceConfig = field(default_factory=ReferenceConfig)
+    limits: LimitsConfig = field(default_factory=LimitsConfig)
+    repair: RepairConfig = field(default_factory=RepairConfig)
+    ego: EgoConfig = field(default_factory=EgoConfig)
+    casadi: CasadiConfig = field(default_factory=CasadiConfig)
+    qptr: QptrConfig = field(default_factory=QptrConfig)
+    checker: CheckerConfig = field(default_factory=CheckerConfig)
+    for_backend: dict[str, Any] = field(default_factory=dict)
+
+
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "driver": ("f_ttr", "at_ttr"),
+    "search.rule": ("bisect", "as_printed", "scan"),
+    "search.sides": ("best", "first"),
+    "scene.after_prediction": ("remove", "hold", "constant_velocity"),
+    "reference.source": ("planner", "constant", "accelerate", "recorded", "file"),
+    "reference.awareness": ("none", "constant_velocity"),
+    "repair.lateral": ("none", "lane", "same_direction", "road"),
+    "casadi.solver": ("ipopt", "sqpmethod"),
+    "casadi.obstacles": ("hull", "sampled"),
+    "checker.official": ("leftover", "always", "never"),
+}
+
+# key -> (lowest, highest) that make sense; both ends included.
+RANGES: Mapping[str, tuple[float, float]] = {
+    "search.delta_t": (1e-3, 1e3),
+    "search.upper": (0.0, 1e3),
+    "search.time_limit": (0.0, 1e6),
+    "scene.horizon": (1e-3, 1e3),
+    "scene.s_offset": (0.0, 100.0),
+    "scene.l_offset": (0.0, 100.0),
+    "repair.horizon": (1e-3, 1e3),
+    "repair.after_conflict": (0.1, 1e3),
+    "repair.clearance": (0.0, 50.0),
+    "repair.margin": (0.0, 50.0),
+    "repair.degree": (3, 5),
+    "repair.spacing": (0.02, 5.0),
+    "limits.v_max": (0.1, 200.0),
+    "limits.v_lat": (1e-3, 100.0),
+    "limits.a_min": (-100.0, -1e-3),
+    "limits.a_max": (1e-3, 100.0),
+    "limits.a_lat": (1e-3, 100.0),
+    "limits.a_total": (1e-3, 100.0),
+    "limits.j_lon": (1e-2, 1e6),
+    "limits.j_lat": (1e-2, 1e6),
+    "reference.a_lat": (1e-2, 50.0),
+    "reference.a_min": (-50.0, -1e-2),
+    "reference.a_max": (1e-2, 50.0),
+    "reference.desired_speed": (0.0, 200.0),
+    "reference.time_step": (0.1, 5.0),
+    "reference.speed_step": (0.02, 5.0),
+    "reference.progress": (0.0, 100.0),
+    "ego.elastic": (0.1, 0.9999),
+    "ego.joint": (1.0, 100.0),
+    "ego.max_iterations": (1, 100_000),
+    "ego.tolerance": (1e-12, 1e3),
+    "ego.rebounds": (0, 20),
+    "casadi.max_iterations": (1, 100_000),
+    "casadi.tolerance": (1e-12, 1.0),
+    "checker.substeps": (1, 50),
+    "qptr.degree": (3, 9),
+    "qptr.spacing": (0.05, 5.0),
+}
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the bundled presets."""
+    return tuple(sorted(p.stem for p in _PRESETS.glob("*.yaml")))
+
+
+def load_config(
+    preset: str | None = None,
+    file: str | Path | None = None,
+    overrides: Iterable[str] | Mapping[str, Any] = (),
+    **keys: Any,
+) -> Config:
+    """Resolve a configuration.
+
+    Parameters
+    ----------
+    preset : str, optional
+        Name of a bundled preset (see :func:`preset_names`).
+    file : path, optional
+        YAML file of the same schema.
+    overrides : iterable of ``"key=value"`` or mapping of dotted keys
+        Last word on everything except what ``for_backend`` says.
+    **keys
+        Top-level keys (``backend="casadi"``).
+
+    Raises
+    ------
+    ConfigError
+        Naming the key, what it got and what it expects.
+    """
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    schema = OmegaConf.structured(Config)
+    layers: list[tuple[str, Any]] = []
+    if preset is not None:
+        path = _PRESETS / f"{preset}.yaml"
+        if preset not in preset_names():
+            raise ConfigError(f"preset {preset!r} is unknown; there are {', '.join(preset_names())}")
+        layers.append((f"preset {preset}", _read_yaml(path)))
+    if file is not None:
+        layers.append((str(file), _read_yaml(Path(file))))
+    layers.append(("overrides", _dotted(overrides)))
+    layers.append(("overrides", OmegaConf.create({k: v for k, v in keys.items() if v is not None})))
+    merged = schema
+    own: list[Any] = []
+    for name, layer in layers:
+        try:
+            merged = OmegaConf.merge(merged, layer)
+        except (OmegaConfBaseException, ValueError, TypeError) as error:
+            raise ConfigError(_explain(name, error)) from error
+        own.append(layer)
+    merged = _apply_backend_section(merged, own[-2:])
+    return _validated(merged)
+
+
+def _apply_backend_section(merged: Any, explicit: list[Any]) -> Any:
+    """Lay ``for_backend.<backend>`` over the rest, and what the user said explicitly over that."""
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    section = merged.for_backend.get(merged.backend)
+    merged.for_backend = {}
+    if section is None:
+        return merged
+    try:
+        return OmegaConf.merge(merged, section, *explicit)
+    except (OmegaConfBaseException, ValueError, TypeError) as error:
+        raise ConfigError(_explain(f"for_backend.{merged.backend}", error)) from error
+
+
+def _read_yaml(path: Path) -> Any:
+    from omegaconf import DictConfig, OmegaConf
+    from yaml import YAMLError
+
+    try:
+        layer = OmegaConf.load(path)
+    except FileNotFoundError as error:
+        raise ConfigError(f"configuration file {path} does not exist") from error
+    except (OSError, YAMLError, UnicodeDecodeError, ValueError) as error:
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ConfigError(f"configuration file {path} cannot be read: {first}") from error
+    if not isinstance(layer, DictConfig):
+        raise ConfigError(f"configuration file {path} must hold a mapping of keys")
+    return layer
+
+
+def _dotted(overrides: Iterable[str] | Mapping[str, Any]) -> Any:
+    from omegaconf import OmegaConf
+    from yaml import YAMLError
+
+    if isinstance(overrides, Mapping):
+        layer = OmegaConf.create()
+        for key, value in overrides.items():
+            OmegaConf.update(layer, key, value)
+        return layer
+    items = list(overrides)
+    for item in items:
+        if "=" not in item or not item.split("=", 1)[0].strip():
+            raise ConfigError(f"override {item!r} must have the form key=value")
+    try:
+        return OmegaConf.from_dotlist(items)
+    except (YAMLError, ValueError, TypeError) as error:
+        raise ConfigError(f"overrides {items} cannot be read: {str(error).splitlines()[0]}") from error
+
+
+def _explain(layer: str, error: Exception) -> str:
+    key = getattr(error, "full_key", None) or ""
+    message = str(error).splitlines()[0].rstrip(".")
+    if "not in" in message and key:
+        import difflib
+
+        known = sorted(_flat_keys())
+        close = difflib.get_close_matches(key, known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        return f"{layer}: there is no configuration key {key!r}{hint}"
+    return f"{layer}: configuration key {key!r}: {message}" if key else f"{layer}: {message}"
+
+
+def _flat_keys() -> set[str]:
+    from omegaconf import DictConfig, OmegaConf
+
+    keys: set[str] = set()
+
+    def walk(node: Any, prefix: str) -> None:
+        for name in node:
+            full = f"{prefix}{name}"
+            keys.add(full)
+            child = node._get_node(name)
+            if isinstance(child, DictConfig):
+                walk(child, f"{full}.")
+
+    walk(OmegaConf.structured(Config), "")
+    return keys
+
+
+def _validated(merged: Any) -> Config:
+    import math
+
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    for key, choices in CHOICES.items():
+        value = OmegaConf.select(merged, key)
+        if value not in choices:
+            raise ConfigError(f"configuration key {key!r} is {value!r}; it must be one of {', '.join(choices)}")
+    for key in _flat_keys():
+        value = OmegaConf.select(merged, key)
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ConfigError(f"configuration key {key!r} is {value}; it must be a finite number")
+    for key, (low, high) in RANGES.items():
+        value = OmegaConf.select(merged, key)
+        if value is not None and not low <= value <= high:
+            raise ConfigError(f"configuration key {key!r} is {value}; it must lie in [{low:g}, {high:g}]")
+    try:
+        return OmegaConf.to_object(merged)  # type: ignore[return-value]
+    except OmegaConfBaseException as error:
+        raise ConfigError(_explain("configuration", error)) from error

@@ -1,0 +1,355 @@
+"""Kinematic single-track states along a driven path, and whether the vehicle can drive them.
+
+The model is CommonRoad's KS model (Althoff and Würsching, *CommonRoad: Vehicle Models*, 2020),
+referenced to the rear axle; CommonRoad states are referenced to the centre of the vehicle, ``rear``
+(b) ahead of that axle. With theta the direction of the centre's velocity and psi the orientation of
+the body, the slip angle at the centre is beta = theta - psi, and
+
+    tan(beta) = b / L * tan(delta)                     (no slip at the wheels)
+    d(psi)/d(sigma) = sin(beta) / b                    (sigma: arc length driven by the centre)
+
+The drivability checker's own test runs an optimiser on every transition (6 to 14 ms each).
+:func:`direct_check` answers in microseconds for transitions that are clearly drivable;
+:func:`official_check` asks the drivability checker about the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.types import Array
+
+if TYPE_CHECKING:
+    from repair.scene.vehicle import Vehicle
+
+__all__ = [
+    "LIMITS",
+    "DrivenStates",
+    "KinematicReport",
+    "OfficialReport",
+    "direct_check",
+    "drive",
+    "official_check",
+    "to_ks_states",
+]
+
+# The official tolerances: position error per axis [m], orientation error [rad].
+POSITION_TOLERANCE = 0.02
+ORIENTATION_TOLERANCE = 0.03
+
+LIMITS = ("steering_rate", "steering_angle", "speed", "acceleration", "friction", "position", "orientation")
+
+# Share of each official limit that direct_check accepts. The official test is an SLSQP run from a
+# zero input on a non-smooth cost and can fail close to its own limits although a valid input exists;
+# the shares were found by fuzzing (tests/property/test_direct_check.py). A steering rate beyond its
+# share is no reason by itself: the official test does not compare steering angles, so the rate is cut
+# off there and the position and orientation that it leads to decide.
+_STEERING_RATE = 0.9
+_ACCEPT = np.array([np.inf, 0.95, 0.98, 0.9, 0.9, 0.5, 0.5])[:, None]
+# Where the model cuts the acceleration off (engine power above v_switch, top speed) the cost is flat,
+# and the optimiser, which overshoots, stays there if that is already better than its start at zero:
+# from half of the limit on.
+_ENGINE = 0.45
+
+
+@dataclass(frozen=True)
+class DrivenStates:
+    """States of the kinematic single-track model, all (K,).
+
+    Attributes
+    ----------
+    t : array
+        Time [s].
+    x, y : array
+        Centre of the vehicle [m].
+    steering : array
+        Steering angle delta of the front wheels [rad].
+    speed : array
+        Speed at the rear axle [m/s].
+    orientation : array
+        Orientation psi of the body [rad], unwrapped.
+    """
+
+    t: Array
+    x: Array
+    y: Array
+    steering: Array
+    speed: Array
+    orientation: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def every(self, n: int) -> DrivenStates:
+        """Every ``n``-th state, the first included."""
+        return DrivenStates(
+            self.t[::n], self.x[::n], self.y[::n], self.steering[::n], self.speed[::n], self.orientation[::n]
+        )
+
+
+@dataclass(frozen=True)
+class KinematicReport:
+    """Answer of :func:`direct_check` for T - 1 transitions.
+
+    Attributes
+    ----------
+    ok : (T - 1,) bool array
+        The transition is drivable, and the drivability checker will agree. False means *not known*.
+    margin : (T - 1,) array
+        1 - value / accepted value of the tightest limit; negative where ``ok`` is False.
+    worst : (T - 1,) int array
+        Index into :data:`LIMITS` of that tightest limit.
+    use : (7, T - 1) array
+        Value / official limit, per limit in the order of :data:`LIMITS`; above 1 is beyond the limit.
+    """
+
+    ok: npt.NDArray[np.bool_]
+    margin: Array
+    worst: npt.NDArray[np.intp]
+    use: Array
+
+    def limit(self, transition: int) -> str:
+        """Name of the tightest limit of a transition."""
+        return LIMITS[int(self.worst[transition])]
+
+
+@dataclass(frozen=True)
+class OfficialReport:
+    """Answer of :func:`official_check`.
+
+    Attributes
+    ----------
+    transitions : (n,) int array
+        The transitions asked about.
+    ok : (n,) bool array
+    reasons : dict
+        Transition -> why not, for every transition that is not ok.
+    """
+
+    transitions: npt.NDArray[np.intp]
+    ok: npt.NDArray[np.bool_]
+    reasons: dict[int, str]
+
+
+def drive(
+    t: Array,
+    xy: Array,
+    heading: Array,
+    speed: Array,
+    distance: Array,
+    vehicle: Vehicle,
+    *,
+    slip0: float | None = None,
+) -> DrivenStates:
+    """States of the vehicle whose centre drives a sampled path.
+
+    Parameters
+    ----------
+    t : (K,) array
+        Times [s].
+    xy : (K, 2) array
+        Centre of the vehicle [m].
+    heading : (K,) array
+        Direction theta of the centre's velocity [rad], unwrapped.
+    speed : (K,) array
+        Speed of the centre [m/s].
+    distance : (K,) array
+        Arc length sigma driven by the centre [m], not decreasing.
+    vehicle : Vehicle
+    slip0 : float, optional
+        Slip angle beta = theta - psi at the first sample [rad]; by default that of steady driving at
+        the path's initial curvature, asin(kappa b).
+
+    Returns
+    -------
+    DrivenStates
+        Where ``distance`` does not grow, orientation and steering are held: a vehicle at rest does
+        not turn, whatever the path's heading does there.
+    """
+    step = np.maximum(np.diff(distance), 0.0)
+    moving = step > 1e-9
+    turn = np.where(moving, np.diff(heading), 0.0)
+    slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+    orientation = heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
+    steering = np.arctan(vehicle.wheelbase / vehicle.rear * np.tan(slip))
+    return DrivenStates(t, xy[:, 0], xy[:, 1], steering, speed * np.cos(slip), orientation)
+
+
+def _slip_angle(
+    turn: Array, step: Array, moving: npt.NDArray[np.bool_], rear: float, slip0: float | None
+) -> Array:
+    """Integrate d(beta)/d(sigma) = d(theta)/d(sigma) - sin(beta)/b over the samples.
+
+    Each interval is split: half of the turn, then a straight piece, then the other half. On a straight
+    piece the rear axle draws a tractrix, tan(beta/2) shrinking by exp(-step/b) exactly; the turn is
+    scaled so that the small-angle solution at constant curvature is exact as well. In tan(beta/2) a
+    rotation is a Möbius map, so that the recurrence needs no trigonometric function.
+    """
+    if slip0 is None:
+        first = int(np.argmax(moving)) if moving.any() else -1
+        bend = rear * turn[first] / step[first] if first >= 0 else 0.0
+        slip0 = float(np.arcsin(np.clip(bend, -0.95, 0.95)))
+    if not len(step):
+        return np.array([slip0])
+    ratio = step / (2.0 * rear)
+    half = 0.5 * turn * np.where(moving, np.tanh(ratio) / np.maximum(ratio, 1e-12), 0.0)
+    rotation = half.copy()
+    rotation[1:] += half[:-1]
+    decay = np.exp(-step / rear)
+    value = float(np.tan(0.5 * slip0))
+    values = []
+    for tangent, factor in zip(np.tan(0.5 * rotation).tolist(), decay.tolist(), strict=True):
+        value = factor * (value + tangent) / (1.0 - value * tangent)
+        values.append(value)
+    return np.concatenate(([slip0], 2.0 * np.arctan(values) + half))
+
+
+def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> KinematicReport:
+    """Accept the transitions that are clearly drivable for the KS model.
+
+    The inputs are the difference quotients of steering angle and speed; the model is integrated from
+    each state (Runge-Kutta of order 4, the inputs constant) and the result held against the next one.
+    A transition is accepted where every quantity stays within a share of the official limit.
+
+    Parameters
+    ----------
+    states : DrivenStates
+        At the scenario's time steps, T of them.
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
+
+    Returns
+    -------
+    KinematicReport
+        ``ok`` True implies that
+        ``commonroad_dc.feasibility.feasibility_checker.state_transition_feasibility`` says yes.
+    """
+    delta, v, psi = states.steering, states.speed, states.orientation
+    rate = np.diff(delta) / dt
+    acceleration = np.diff(v) / dt
+    fastest = _STEERING_RATE * vehicle.steering_rate_max
+    turned_to = delta[:-1] + dt * np.clip(rate, -fastest, fastest)
+    yaw, dx, dy = _integrate(delta[:-1], turned_to, v, psi[:-1], dt, vehicle.wheelbase)
+
+    x = states.x - vehicle.rear * np.cos(psi)
+    y = states.y - vehicle.rear * np.sin(psi)
+    error = np.maximum(np.abs(np.diff(x) - dx), np.abs(np.diff(y) - dy))
+
+    # vehiclemodels: above v_switch the engine's power limits the acceleration; the limit falls over
+    # the step, so the speed at its end decides.
+    engine = vehicle.a_max * np.minimum(1.0, vehicle.v_switch / np.maximum(v[1:], vehicle.v_switch))
+    lateral = v[:-1] ** 2 * np.tan(delta[:-1]) / vehicle.wheelbase
+    largest = np.maximum(np.abs(delta[:-1]), np.abs(delta[1:]))
+    overshoot = v[1:] + np.diff(v)
+    fastest_speed = np.maximum(v[:-1], overshoot)
+    slowest_speed = np.minimum(v[:-1], overshoot)
+    use = np.stack(
+        (
+            np.abs(rate) / vehicle.steering_rate_max,
+            largest / vehicle.steering_max,
+            np.maximum(fastest_speed / vehicle.v_max, slowest_speed / vehicle.v_min),
+            np.abs(acceleration) / np.where(acceleration > 0, engine, vehicle.a_max),
+            np.hypot(acceleration, lateral) / vehicle.a_max,
+            error / POSITION_TOLERANCE,
+            np.abs(np.diff(psi) - yaw) / ORIENTATION_TOLERANCE,
+        )
+    )
+    accept = np.repeat(_ACCEPT, use.shape[1], axis=1)
+    accept[3, (acceleration > 0.0) & (engine < vehicle.a_max)] = _ENGINE
+    room = 1.0 - use / accept
+    worst = np.argmin(room, axis=0)
+    margin = room[worst, np.arange(room.shape[1])]
+    ok = margin >= 0.0
+    worst[~ok & (use[0] > _STEERING_RATE)] = 0  # the error comes from the cut
+    return KinematicReport(ok, margin, worst, use)
+
+
+def _integrate(
+    delta: Array, delta_end: Array, v: Array, psi: Array, dt: float, wheelbase: float
+) -> tuple[Array, Array, Array]:
+    """Change of orientation and rear-axle position over each transition at constant inputs, each (T - 1,).
+
+    Steering angle and speed are linear in time, so that Runge-Kutta of order 4 becomes Simpson's rule,
+    first for the orientation (and its value in the middle), then for the position. ``v`` is (T,), the
+    other arrays are (T - 1,).
+    """
+    v_start, v_end = v[:-1], v[1:]
+    v_mid = 0.5 * (v_start + v_end)
+    tangent = np.tan(np.stack((delta, 0.5 * (delta + delta_end), delta_end)))
+    start, mid, end = tangent * np.stack((v_start, v_mid, v_end)) * (dt / wheelbase)
+    turned = (start + 4.0 * mid + end) / 6.0
+    angle = np.stack((psi, psi + (5.0 * start + 8.0 * mid - end) / 24.0, psi + turned))
+    weighted = np.stack((v_start, 4.0 * v_mid, v_end)) * (dt / 6.0)
+    return turned, (weighted * np.cos(angle)).sum(axis=0), (weighted * np.sin(angle)).sum(axis=0)
+
+
+def official_check(
+    states: DrivenStates, dt: float, vehicle: Vehicle, transitions: Iterable[int] | None = None
+) -> OfficialReport:
+    """Ask the drivability checker about single transitions.
+
+    Parameters
+    ----------
+    states : DrivenStates
+        At the scenario's time steps.
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
+    transitions : iterable of int, optional
+        Transition i leads from state i to state i + 1; by default all.
+
+    Returns
+    -------
+    OfficialReport
+        An exception inside the drivability checker is a "no" with its message as the reason.
+    """
+    from commonroad.common.solution import VehicleType
+    from commonroad_dc.feasibility.feasibility_checker import state_transition_feasibility
+    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+
+    asked = np.arange(len(states) - 1) if transitions is None else np.array(list(transitions), dtype=np.intp)
+    ks = to_ks_states(states, 0)
+    dynamics = VehicleDynamics.KS(VehicleType(vehicle.type_id))
+    reasons: dict[int, str] = {}
+    for i in asked.tolist():
+        values = [(s.position[0], s.position[1], s.steering_angle, s.velocity, s.orientation) for s in ks[i : i + 2]]
+        if not np.isfinite(values).all():
+            reasons[i] = "a state is not finite"
+            continue
+        try:
+            feasible, _ = state_transition_feasibility(ks[i], ks[i + 1], dynamics, dt)
+        except Exception as error:  # the checker wraps whatever happens into a bare Exception
+            cause = error.__cause__ or error
+            reasons[i] = f"drivability checker: {type(cause).__name__}: {cause}"
+            continue
+        if not feasible:
+            reasons[i] = "no input of the KS model leads to the next state"
+    return OfficialReport(asked, np.array([i not in reasons for i in asked.tolist()], dtype=np.bool_), reasons)
+
+
+def to_ks_states(states: DrivenStates, initial_time_step: int) -> list[Any]:
+    """The states as ``commonroad.scenario.state.KSState``, one time step apart.
+
+    Values are plain floats (the solution writer then writes them so that reading gives the same
+    numbers); orientations are brought into [-pi, pi], as CommonRoad demands.
+    """
+    from commonroad.scenario.state import KSState
+
+    wrapped = np.arctan2(np.sin(states.orientation), np.cos(states.orientation))
+    rows = np.column_stack((states.steering, states.speed, wrapped)).tolist()
+    return [
+        KSState(
+            time_step=initial_time_step + i,
+            position=np.array([states.x[i], states.y[i]]),
+            steering_angle=steering,
+            velocity=speed,
+            orientation=orientation,
+        )
+        for i, (steering, speed, orientation) in enumerate(rows)
+    ]

@@ -1,0 +1,133 @@
+"""From a scene and its reference to repair problems: limits, room, culling, sides of passing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.config import Config, LimitsConfig
+from repair.occupancy import relevant
+from repair.passing import open_passings
+from repair.types import Array, Curve, LateralBounds, Limits, Occupancy, RepairProblem, frozen
+
+if TYPE_CHECKING:
+    from repair.scene.commonroad import Scene
+    from repair.scene.vehicle import Vehicle
+
+__all__ = ["ProblemFactory", "resolve_limits"]
+
+# Share of the vehicle's friction circle that a repair may use where nothing else is configured:
+# the rest is left for what the kinematic model adds to the planned accelerations.
+_USABLE = 0.9
+
+
+def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float) -> Limits:
+    """Limits with the vehicle's own numbers where the configuration leaves them open.
+
+    Parameters
+    ----------
+    speed : float
+        Initial speed [m/s]; beyond ``v_switch`` the engine limits acceleration (CommonRoad vehicle
+        models, eq. 2), and the limit is taken a little above this speed.
+    """
+    usable = _USABLE * vehicle.a_max
+    engine = usable * min(1.0, vehicle.v_switch / max(speed + 3.0, 1e-3))
+    slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(0.95 * vehicle.steering_max))
+    a_total = usable if config.a_total is None else config.a_total
+    return Limits(
+        v_max=config.v_max if config.v_max is not None else vehicle.v_max,
+        v_lat=config.v_lat,
+        a_min=config.a_min if config.a_min is not None else -a_total,
+        a_max=config.a_max if config.a_max is not None else engine,
+        a_lat=config.a_lat if config.a_lat is not None else a_total,
+        a_total=a_total,
+        j_lon=config.j_lon,
+        j_lat=config.j_lat,
+        curvature=float(np.sin(slip) / vehicle.rear),
+    )
+
+
+@dataclass(frozen=True)
+class ProblemFactory:
+    """Makes the repair problems of one scene and reference (a :class:`repair.search.ProblemSource`).
+
+    Attributes
+    ----------
+    scene : Scene
+    config : Config
+    limits : Limits
+    occupancy : Occupancy
+        All obstacles, inflated.
+    reference : Curve
+    t_end : float
+        End of every repair [s].
+    """
+
+    scene: Scene
+    config: Config
+    limits: Limits
+    occupancy: Occupancy
+    reference: Curve
+    t_end: float
+
+    @cached_property
+    def bounds(self) -> LateralBounds:
+        """Lateral room of the reference point, as ``repair.lateral`` says."""
+        wide = {"lane": self.scene.lane, "same_direction": self.scene.same_direction, "road": self.scene.road}
+        return wide.get(self.config.repair.lateral, self.scene.lane)
+
+    @cached_property
+    def _axis(self) -> tuple[Array, Array]:
+        s0 = float(self.scene.start[0, 0])
+        s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
+        return frozen(s), frozen(self.scene.frame.curvature(s))
+
+    def at(self, t_rep: float) -> tuple[RepairProblem, ...]:
+        """One problem for each open side of passing, the gentlest guide first."""
+        settings = self.config.repair
+        lateral = settings.lateral != "none"
+        step = self.scene.dt
+        count = int(np.ceil((self.t_end - t_rep) / step - 1e-6))
+        times = t_rep + step * np.arange(count + 1)
+        reference = self.reference.sample(times)
+        start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+        occupancy = self._within_reach(start, t_rep, reference.position, lateral)
+        passings = open_passings(
+            reference, start, occupancy, self.bounds, self.limits, settings.margin, lateral
+        )
+        s, curvature = self._axis
+        return tuple(
+            RepairProblem(
+                reference=self.reference,
+                t_rep=t_rep,
+                t_end=self.t_end,
+                start=start,
+                occupancy=occupancy,
+                bounds=self.bounds,
+                limits=self.limits,
+                clearance=settings.clearance,
+                margin=settings.margin,
+                passing=passing,
+                curvature_s=s,
+                curvature=curvature,
+                dt=step,
+                lateral=lateral,
+            )
+            for passing in passings
+        )
+
+    def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:
+        duration = self.t_end - t_rep
+        s0, v0 = start[0, 0], max(start[1, 0], 0.0)
+        ahead = s0 + v0 * duration + 0.5 * self.limits.a_max * duration**2
+        reach = np.array([s0 - 1.0, ahead + 1.0])
+        if lateral:
+            right, left = self.bounds.at(np.linspace(*reach, 50))
+            room = np.array([right.min(), left.max()])
+        else:
+            room = np.array([reference[:, 1].min(), reference[:, 1].max()])
+        margin = self.config.repair.margin + self.config.repair.clearance
+        return relevant(self.occupancy, start, t_rep, self.t_end, reach, room + [-margin, margin])

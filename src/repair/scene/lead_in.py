@@ -1,0 +1,191 @@
+"""The path the ego drives: from its initial pose smoothly onto the route's centre line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repair.errors import ScenarioError
+from repair.scene.frame import FrenetFrame
+from repair.scene.vehicle import Vehicle
+from repair.types import Array
+
+__all__ = ["LeadIn", "drive_path", "largest_curvature"]
+
+_BACK = 30.0  # path behind the ego, so that followers have coordinates [m]
+_COMFORT = 1.5  # lateral acceleration that the lead-in may add at the initial speed [m/s²]
+_SHARP = 0.25  # curvature of a centre line above which its kinks are smoothed harder [1/m]
+_STEEP = 0.6  # heading error above which the ego first turns towards the route [rad]
+
+
+@dataclass(frozen=True)
+class LeadIn:
+    """The frame along the driven path, the ego's arc length on it, and what had to be assumed."""
+
+    frame: FrenetFrame
+    start: float
+    blend: float
+    notes: tuple[str, ...]
+
+
+def largest_curvature(vehicle: Vehicle) -> float:
+    """Largest path curvature of the body centre [1/m], from the steering limit (kinematic model)."""
+    slip = np.arctan(np.tan(vehicle.steering_max) * vehicle.rear / vehicle.wheelbase)
+    return float(np.sin(slip) / vehicle.rear)
+
+
+def route_frame(center: Array) -> tuple[FrenetFrame, float]:
+    """Frame along a centre line, smoothed as little as its kinks allow; also the tolerance used [m]."""
+    for tolerance in (0.1, 0.15, 0.25, 0.5, 1.0):
+        frame = FrenetFrame.from_points(center, smoothing=tolerance)
+        if np.max(np.abs(frame.curvature_table)) <= _SHARP:
+            break
+    return frame, tolerance
+
+
+def _quintic(start: Array, length: float, x: Array) -> Array:
+    """Value, slope and second derivative at ``x`` of the quintic from ``start`` (3,) to rest; (3, K)."""
+    y, y1, y2 = start[0], start[1] * length, start[2] * length**2
+    u = np.clip(x / length, 0.0, 1.0)
+    c3, c4, c5 = -10 * y - 6 * y1 - 1.5 * y2, 15 * y + 8 * y1 + 1.5 * y2, -6 * y - 3 * y1 - 0.5 * y2
+    value = y + u * (y1 + u * (y2 / 2 + u * (c3 + u * (c4 + u * c5))))
+    slope = y1 + u * (y2 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))
+    second = y2 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))
+    return np.stack([value, slope / length, second / length**2])
+
+
+def _offset_curvature(frame: FrenetFrame, s: Array, l: Array) -> Array:  # noqa: E741
+    """Curvature of the curve with offsets ``l`` (3, K) over the frame at ``s``."""
+    kappa, rate = frame.curvature(s), frame.curvature_rate(s)
+    width = 1.0 - kappa * l[0]
+    square = width**2 + l[1] ** 2
+    twist = (rate * l[0] + kappa * l[1]) * l[1]
+    return np.asarray((width * (l[2] + kappa * width) + kappa * l[1] ** 2 + twist) / square**1.5)
+
+
+def _start_offsets(frame: FrenetFrame, s0: float, l0: float, error: float, curvature: float) -> Array:
+    """Offset, slope and second derivative at s0 of a path with this heading error and curvature."""
+    kappa, rate = float(frame.curvature(s0)), float(frame.curvature_rate(s0))
+    width = 1.0 - kappa * l0
+    slope = width * np.tan(error)
+    square = width**2 + slope**2
+    # the curvature formula above, solved for the second derivative
+    second = (curvature * square**1.5 - kappa * slope**2 - (rate * l0 + kappa * slope) * slope) / width
+    return np.array([l0, slope, second - kappa * width])
+
+
+def _blend_length(frame: FrenetFrame, s0: float, start: Array, speed: float, limit: float) -> float:
+    """Shortest blend whose curvature is drivable and adds a comfortable lateral acceleration."""
+    least = max(8.0, 1.5 * speed)
+    options = least * 1.15 ** np.arange(24)
+    options = options[options <= max(least, 160.0)]
+    best, worst = options[0], np.inf
+    for length in options:
+        s = s0 + np.linspace(0.0, length, 64)
+        offsets = _quintic(start, length, s - s0)
+        along = frame.curvature(s)
+        if np.min(1.0 - along * offsets[0]) < 0.2:
+            continue
+        kappa = _offset_curvature(frame, s, offsets)
+        excess = max(
+            np.max(np.abs(kappa)) / limit,
+            np.max(np.abs(kappa) - np.abs(along)) * speed**2 / _COMFORT,
+        )
+        if excess < worst - 1e-3:
+            best, worst = length, excess
+        if excess <= 1.0:
+            break
+    return float(best)
+
+
+def _turn_in(frame: FrenetFrame, pose: Array, limit: float) -> Array:
+    """Steer from a pose (x, y, heading) towards the route until the heading error is small.
+
+    Pure pursuit with limited curvature, in steps of 0.25 m; returns the poses (K, 3).
+    """
+    step, ahead = 0.25, 6.0
+    poses = [np.asarray(pose, dtype=np.float64)]
+    kappa = 0.0
+    for _ in range(400):
+        x, y, heading = poses[-1]
+        s = frame.to_frenet(np.array([[x, y]]))[0, 0]
+        if not np.isfinite(s):
+            break
+        if len(poses) > 1 and abs(_wrapped(heading - float(frame.heading(s)))) < 0.3:
+            return np.array(poses)
+        target = frame.position(s + ahead) - np.array([x, y])
+        alpha = _wrapped(np.arctan2(target[1], target[0]) - heading)
+        wanted = np.clip(2.0 * np.sin(alpha) / np.hypot(*target), -limit, limit)
+        if abs(alpha) > np.pi / 2:
+            wanted = np.copysign(limit, alpha)
+        kappa += float(np.clip(wanted - kappa, -0.06, 0.06))
+        middle = heading + kappa * step / 2
+        poses.append(np.array([x + step * np.cos(middle), y + step * np.sin(middle), heading + kappa * step]))
+    raise ScenarioError("no drivable path leads from the ego's initial pose onto its route")
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def drive_path(center: Array, position: Array, orientation: float, speed: float, vehicle: Vehicle) -> LeadIn:
+    """Lay the frame along the path from the ego's pose onto the centre line.
+
+    In the route's own frame the path is a quintic l(s) from the ego's offset, direction and the
+    route's curvature to zero. The direction of motion is the orientation plus the slip angle
+    ``asin(b kappa)`` of the body centre.
+
+    Parameters
+    ----------
+    center : (M, 2) array
+        The route's centre line [m].
+    position : (2,) array
+        The ego's initial position [m].
+    orientation, speed : float
+        Initial orientation [rad] and speed [m/s].
+    vehicle : Vehicle
+
+    Raises
+    ------
+    ScenarioError
+        If the start cannot be projected on the route, or no drivable path leads onto it.
+    """
+    frame, tolerance = route_frame(center)
+    notes = []
+    if tolerance > 0.15:
+        notes.append(f"kinks of the centre line were smoothed by up to {tolerance:g} m")
+    limit = 0.8 * largest_curvature(vehicle)
+    s0, l0 = frame.to_frenet(np.asarray(position)[None])[0]
+    if not np.isfinite(s0):
+        raise ScenarioError("the ego's initial position cannot be projected on its route")
+    curvature = float(np.clip(frame.curvature(s0) / (1.0 - frame.curvature(s0) * l0), -limit, limit))
+    direction = orientation + float(np.arcsin(vehicle.rear * curvature))
+    error = _wrapped(direction - float(frame.heading(s0)))
+    turn = np.empty((0, 2))
+    if abs(error) > _STEEP:
+        notes.append(f"the ego starts {np.rad2deg(error):.0f} degrees off its route and first turns towards it")
+        poses = _turn_in(frame, np.array([*position, direction]), limit)
+        turn = poses[:-1, :2]
+        curvature = (poses[-1, 2] - poses[-2, 2]) / 0.25
+        s1, l1 = frame.to_frenet(poses[-1:, :2])[0]
+        error = _wrapped(poses[-1, 2] - float(frame.heading(s1)))
+    else:
+        s1, l1 = s0, l0
+    start = _start_offsets(frame, s1, l1, error, curvature)
+    length = _blend_length(frame, s1, start, speed, limit)
+    end = max(frame.length, s1 + 1.0)
+    grid = s1 + np.arange(0.0, end - s1, 0.5)
+    grid = np.append(grid[: max(1, len(grid) - 1)], end)
+    ahead = frame.to_cartesian(grid, _quintic(start, length, grid - s1)[0])
+    if len(turn):
+        # behind a start across the route, the path is straight: along the ego's own axis
+        back = np.arange(_BACK, 0.0, -0.5)
+        behind = turn[0] - back[:, None] * np.array([np.cos(direction), np.sin(direction)])
+    else:
+        mirror = start * np.array([1.0, -1.0, 1.0])
+        back = np.arange(_BACK, 0.0, -0.5)
+        behind = frame.to_cartesian(s1 - back, _quintic(mirror, max(length, 10.0), back)[0])
+    path = FrenetFrame.from_points(np.concatenate([behind, turn, ahead]), smoothing=0.0)
+    where = path.to_frenet(np.asarray(position)[None], near=_BACK)[0]
+    return LeadIn(path, float(where[0]), length, tuple(notes))

@@ -1,0 +1,253 @@
+"""Algorithm 1: the Feasible Time-To-React by search over t_rep, for any backend.
+
+The search runs on integer multiples of Delta T (1.6 - 1.2 > 0.4 in floating point) and the F-TTR is
+the last *verified* t_rep. Algorithm 1 as printed returns a midpoint that was never tested and cannot
+produce the iterates that the paper reports; rule ``as_printed`` visits what it would visit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from repair.config import SearchConfig
+from repair.types import (
+    Conflict,
+    Curve,
+    Probe,
+    Reason,
+    RepairBackend,
+    RepairProblem,
+    SearchResult,
+    SearchStatus,
+    SolveResult,
+    SolveStatus,
+    Verdict,
+    Violation,
+)
+
+__all__ = ["Order", "ProblemSource", "TrajectoryChecker", "probe_order", "search_f_ttr"]
+
+#: Yields the next t_rep [s], is sent whether it was feasible.
+Order = Generator[float, bool, None]
+
+
+class ProblemSource(Protocol):
+    """Makes the repair problems of a t_rep, one for each open side of passing."""
+
+    def at(self, t_rep: float) -> Sequence[RepairProblem]:
+        """Problems in the order in which they should be tried; empty where no way is open."""
+        ...
+
+
+class TrajectoryChecker(Protocol):
+    """Judges a repaired curve; the same for every backend."""
+
+    def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
+        """Verdict on the reference until t_rep followed by ``curve``."""
+        ...
+
+
+def _grid_size(end: float, delta_t: float) -> int:
+    """Number of grid points k * delta_t in [0, end)."""
+    import math
+
+    return max(0, math.ceil(end / delta_t - 1e-9))
+
+
+def _bisect(end: float, delta_t: float) -> Order:
+    feasible, infeasible = -1, _grid_size(end, delta_t)
+    if infeasible == 0:
+        return
+    if (yield 0.0):
+        feasible = 0
+    else:
+        return
+    while infeasible - feasible > 1:
+        middle = (feasible + infeasible) // 2
+        if (yield middle * delta_t):
+            feasible = middle
+        else:
+            infeasible = middle
+
+
+def _scan(end: float, delta_t: float) -> Order:
+    for k in range(_grid_size(end, delta_t)):
+        yield k * delta_t
+
+
+def _as_printed(end: float, delta_t: float) -> Order:
+    start, t_rep = 0.0, 0.0
+    while abs(end - start) > delta_t + 1e-12:
+        if (yield t_rep):
+            start = t_rep
+        else:
+            end = t_rep
+        t_rep = 0.5 * (start + end)
+
+
+_RULES: dict[str, Callable[[float, float], Order]] = {"bisect": _bisect, "scan": _scan, "as_printed": _as_printed}
+
+
+def probe_order(rule: str, end: float, delta_t: float) -> Order:
+    """The times-to-repair that a rule visits below ``end`` [s].
+
+    Parameters
+    ----------
+    rule : str
+        ``bisect``: t_rep = 0, then bisection on the grid, assuming that feasibility is contiguous;
+        ``scan``: every grid point, which assumes nothing; ``as_printed``: Algorithm 1 to the letter.
+    """
+    return _RULES[rule](end, delta_t)
+
+
+@dataclass
+class _Budget:
+    limit: float | None
+    begin: float
+    clock: Callable[[], float]
+
+    @property
+    def left(self) -> float | None:
+        return None if self.limit is None else self.limit - (self.clock() - self.begin)
+
+    @property
+    def spent(self) -> bool:
+        left = self.left
+        return left is not None and left <= 0.0
+
+
+def _probe(
+    t_rep: float,
+    problems: Sequence[RepairProblem],
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    warm_start: Curve | None,
+    budget: _Budget,
+) -> Probe:
+    """Solve and check every open side; keep the feasible one of least cost, else the first failure."""
+    best: Probe | None = None
+    tried: list[str] = []
+    for problem in problems:
+        if tried and budget.spent:
+            break
+        solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+        begin = budget.clock()
+        verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
+        maneuver = problem.passing.maneuver if problem.passing is not None else None
+        name = maneuver.value if maneuver is not None else "follow"
+        tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
+        probe = Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin)
+        if best is None or _better(probe, best):
+            best = probe
+        if sides == "first" and probe.feasible:
+            break
+    if best is None:
+        nothing = SolveResult(SolveStatus.INFEASIBLE, detail="no manoeuvre past the obstacles is open")
+        why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
+        return Probe(t_rep, nothing, Verdict((why,)))
+    return replace(best, tried=tuple(tried))
+
+
+def _better(new: Probe, old: Probe) -> bool:
+    if new.feasible != old.feasible:
+        return new.feasible
+    return new.feasible and new.solve.objective < old.solve.objective
+
+
+def _unsolved(solve: SolveResult, t_rep: float) -> Verdict:
+    reason = Reason.NO_CORRIDOR if solve.status is SolveStatus.NO_CORRIDOR else Reason.NOT_SOLVED
+    return Verdict((Violation(reason, t_rep, solve.detail or solve.status.sentence),))
+
+
+def iter_probes(
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    end: float,
+    settings: SearchConfig,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Iterator[Probe]:
+    """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
+
+    Parameters
+    ----------
+    end : float
+        Upper end of the search [s], excluded: the reference is in conflict there.
+    """
+    budget = _Budget(settings.time_limit, clock(), clock)
+    order = probe_order(settings.rule, end, settings.delta_t)
+    warm_start: Curve | None = None
+    try:
+        t_rep = next(order)
+        while not budget.spent:
+            probe = _probe(t_rep, source.at(t_rep), backend, checker, settings.sides, warm_start, budget)
+            if probe.feasible:
+                warm_start = probe.solve.curve
+            yield probe
+            t_rep = order.send(probe.feasible)
+    except StopIteration:
+        return
+    raise TimeoutError
+
+
+def search_f_ttr(
+    source: ProblemSource,
+    conflict: Conflict,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    settings: SearchConfig,
+    *,
+    on_probe: Callable[[Probe], None] | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> SearchResult:
+    """Algorithm 1 of the paper.
+
+    Parameters
+    ----------
+    source : ProblemSource
+    conflict : Conflict
+        Where the reference fails; its time is the TTC.
+    backend : RepairBackend
+    checker : TrajectoryChecker
+    settings : SearchConfig
+    on_probe : callable, optional
+        Called after every probe; an interrupt in between loses nothing that was found.
+    clock : callable
+        Monotonic time [s]; a parameter so that tests can bend it.
+
+    Returns
+    -------
+    SearchResult
+        ``f_ttr`` is the largest t_rep whose repair was verified.
+    """
+    begin = clock()
+    if conflict.time == float("inf"):
+        return SearchResult(SearchStatus.NO_CONFLICT, conflict, float("inf"), None)
+    if conflict.contact_time <= 0.0:
+        return SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, 0.0, None)
+    # A conflict at t = 0 without contact leaves t_rep = 0 as the only candidate.
+    end = max(conflict.time, settings.delta_t * 1e-3)
+    if settings.upper is not None:
+        end = min(end, max(settings.upper, settings.delta_t * 1e-3))
+    probes: list[Probe] = []
+    complete = True
+    try:
+        for probe in iter_probes(source, backend, checker, end, settings, clock):
+            probes.append(probe)
+            if on_probe is not None:
+                on_probe(probe)
+    except (TimeoutError, KeyboardInterrupt):
+        complete = False
+    feasible = [p for p in probes if p.feasible]
+    wall = clock() - begin
+    if feasible:
+        best = max(feasible, key=lambda p: p.t_rep)
+        return SearchResult(
+            SearchStatus.FOUND, conflict, best.t_rep, best.solve.curve, tuple(probes), complete, wall
+        )
+    status = SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED
+    return SearchResult(status, conflict, None, None, tuple(probes), complete, wall)

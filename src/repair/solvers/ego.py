@@ -1,0 +1,437 @@
+"""The paper's backend: soft penalties on a uniform B-spline, deformation then refinement.
+
+Deformation (Sec. IV-C) minimises J = lambda_s J_s + lambda_c J_c + lambda_d J_d with the start of
+the curve fixed and its end free; refinement (Sec. IV-D) minimises J' = lambda_s J_s + lambda_d J_d
++ lambda_f J_f with both ends fixed and the duration kept (T' = T). The smoothness (and fitting)
+terms are quadratic; the minimisation runs in the coordinates in which that quadratic is the
+identity (a Cholesky preconditioner), which changes the path of L-BFGS and not its goal.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from repair.bspline import UniformBSpline, basis_matrix, derivative_matrix, fit_to_curve, n_points_for
+from repair.config import Config, EgoConfig
+from repair.solvers.penalties import Feasibility, cubic_quadratic, feasibility_bounds
+from repair.types import Array, Curve, Limits, RepairProblem, Side, SolveResult, SolveStatus, frozen
+
+__all__ = ["EgoBackend", "Pairs", "anchor_pairs"]
+
+
+class Pairs(NamedTuple):
+    """The paper's {p, v} pairs, one row each: d = (Q_i - p) . v with v along an axis.
+
+    ``row`` control point, ``axis`` 0 for s and 1 for l, ``sign`` of v on that axis, ``anchor`` the
+    coordinate of p on that axis [m], ``threshold`` the s_f of the pair [m].
+    """
+
+    row: np.ndarray
+    axis: np.ndarray
+    sign: np.ndarray
+    anchor: np.ndarray
+    threshold: np.ndarray
+
+    def distance(self, points: Array) -> Array:
+        """Obstacle distance d_ij of every pair (paper, Definition 3)."""
+        return np.asarray(self.sign * (points[self.row, self.axis] - self.anchor))
+
+
+def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int) -> Pairs:
+    """Pairs for the control points ``first``.. of a curve whose points lie at ``shape``.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Greville times [s]: each control point meets the obstacles at its own time.
+    shape : (n, 2) array
+        Where the control points lie or are led to; decides which boxes stand in their way.
+    first : int
+        Points before this one are fixed and get no pair.
+
+    Notes
+    -----
+    A box that the ego passes behind or ahead of concerns the points inside its lateral interval,
+    one passed on the left or right those inside its longitudinal interval.
+    """
+    n = len(times)
+    parts: list[tuple[Array, Array, Array, Array, Array]] = []
+    passing = problem.passing
+    if passing is not None and len(problem.occupancy):
+        lower, upper = problem.occupancy.at(times)
+        side = passing.side_at(times)
+        inside = (lower < shape) & (shape < upper)
+        along = (side == Side.BEHIND) | (side == Side.AHEAD)
+        concerned = np.where(along, inside[..., 1], inside[..., 0])
+        concerned[:, :first] = False
+        obstacle, row = np.nonzero(concerned)
+        chosen = side[obstacle, row]
+        axis = np.where(along[obstacle, row], 0, 1)
+        # Ahead and left lie at the upper corner of the box, behind and right at the lower one.
+        positive = (chosen == Side.AHEAD) | (chosen == Side.LEFT)
+        anchor = np.where(positive, upper[obstacle, row, axis], lower[obstacle, row, axis])
+        sign = np.where(positive, 1.0, -1.0)
+        parts.append((row, axis, sign, anchor, np.full(len(row), problem.clearance)))
+    if problem.lateral:
+        right, left = problem.bounds.at(shape[first:, 0])
+        row = np.arange(first, n)
+        ones = np.ones(n - first)
+        edge = np.full(n - first, min(problem.clearance, 0.2))
+        for sign_value, anchor in ((1.0, right), (-1.0, left)):
+            parts.append((row, np.ones_like(row), sign_value * ones, anchor, edge))
+    if not parts:
+        empty = np.empty(0)
+        return Pairs(empty.astype(np.intp), empty.astype(np.intp), empty, empty, empty)
+    return Pairs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+@dataclass(frozen=True)
+class _Quadratic:
+    """Cached structure of a stage on one axis: free rows, factor, derivative stack."""
+
+    free: slice
+    hessian: Array  # (n, n) of lambda_s J_s, factor 2 included
+    factor_inv: Array  # (m, m): W = L^-T of the free block, so that x = x_hat + W y
+    stack: Array  # (3n - 6, n): [V; A; J] of all control points
+
+
+@lru_cache(maxsize=128)
+def _stack(n: int, spacing: float) -> Array:
+    return frozen(np.vstack([derivative_matrix(n, k, spacing) for k in (1, 2, 3)]))
+
+
+@lru_cache(maxsize=128)
+def _smoothness(n: int, spacing: float, weight: float) -> Array:
+    acceleration, jerk = derivative_matrix(n, 2, spacing), derivative_matrix(n, 3, spacing)
+    return frozen(2.0 * weight * (acceleration.T @ acceleration + jerk.T @ jerk))
+
+
+@lru_cache(maxsize=128)
+def _deformation_structure(n: int, degree: int, spacing: float, weight: float, precondition: bool) -> _Quadratic:
+    hessian = _smoothness(n, spacing, weight)
+    free = slice(degree, n)
+    block = hessian[free, free]
+    w = np.linalg.inv(np.linalg.cholesky(block)).T if precondition else np.eye(len(block))
+    return _Quadratic(free, hessian, frozen(w), _stack(n, spacing))
+
+
+@lru_cache(maxsize=128)
+def _feasibility(n: int, limits: Limits, config: tuple[float, ...], scale: float) -> Feasibility:
+    w_v, w_a, w_j, elastic, joint, reverse = config
+    maxima = np.array([[limits.v_max, limits.v_lat], [limits.a_max, limits.a_lat], [limits.j_lon, limits.j_lat]])
+    minima = np.array([[0.0, -limits.v_lat], [limits.a_min, -limits.a_lat], [-limits.j_lon, -limits.j_lat]])
+    weights = (scale * w_v, scale * w_a, scale * w_j)
+    return feasibility_bounds(n, maxima, minima, weights, elastic, joint, reverse)
+
+
+class _OutOfTime(Exception):
+    pass
+
+
+@dataclass
+class _Minimum:
+    points: Array
+    cost: float
+    iterations: int
+    converged: bool
+
+
+class EgoBackend:
+    """Deformation and refinement by L-BFGS (paper, Sec. IV; after EGO-Planner, Zhou et al. 2021).
+
+    Parameters
+    ----------
+    config : EgoConfig
+        Weights and solver settings.
+    degree : int
+        Degree of the B-spline.
+    spacing : float
+        Knot spacing [s].
+    """
+
+    name = "ego"
+
+    def __init__(self, config: EgoConfig | None = None, *, degree: int = 3, spacing: float = 0.4) -> None:
+        self.config = config or EgoConfig()
+        self.degree = degree
+        self.spacing = spacing
+
+    def solve(
+        self,
+        problem: RepairProblem,
+        *,
+        warm_start: Curve | None = None,
+        time_limit: float | None = None,
+    ) -> SolveResult:
+        """Deform and refine; the result is soft and it is for the checker to judge it.
+
+        Raises
+        ------
+        repair.errors.BackendError
+            Never for a well-formed problem.
+        """
+        begin = time.perf_counter()
+        deadline = begin + time_limit if time_limit is not None else None
+        n = n_points_for(problem.t_end - problem.t_rep, self.spacing, self.degree)
+        initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, self.spacing)
+        built = time.perf_counter()
+        try:
+            deformed, rounds = self._deform(problem, initial, deadline)
+            refined = self._refine(problem, initial, deformed, deadline)
+        except _OutOfTime:
+            now = time.perf_counter()
+            return SolveResult(
+                SolveStatus.TIME_LIMIT, build_time=built - begin, solve_time=now - built,
+                detail=f"time limit of {time_limit:g} s",
+            )  # fmt: skip
+        curves = {
+            "deformation": UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(deformed.points)),
+            "refinement": UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(refined.points)),
+        }
+        converged = deformed.converged and refined.converged
+        return SolveResult(
+            status=SolveStatus.SOLVED if converged else SolveStatus.ITERATION_LIMIT,
+            curve=curves["refinement"],
+            objective=refined.cost,
+            iterations=deformed.iterations + refined.iterations,
+            build_time=built - begin,
+            solve_time=time.perf_counter() - built,
+            detail=f"deformation {deformed.iterations} iterations in {rounds} round(s), "
+            f"refinement {refined.iterations}",
+            stages=curves,
+        )
+
+    # -- deformation -----------------------------------------------------------------------------
+
+    def _deform(
+        self, problem: RepairProblem, initial: UniformBSpline, deadline: float | None
+    ) -> tuple[_Minimum, int]:
+        """Minimise J; while control points still collide, double lambda_c and start again."""
+        config = self.config
+        collision = config.deform.collision
+        shape = self._led_points(problem, initial)
+        points = initial.points
+        for round_ in range(config.rebounds + 1):
+            pairs = anchor_pairs(problem, initial.greville, shape, self.degree)
+            minimum = self._minimise_deformation(problem, initial, points, pairs, collision, deadline)
+            if pairs.row.size == 0 or pairs.distance(minimum.points).min() >= 0.0:
+                break
+            collision *= 2.0
+            points = minimum.points
+            shape = np.where(np.isnan(shape), points, shape)
+        return minimum, round_ + 1
+
+    def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
+        """Where the guide leads the control points (the reference where there is no guide)."""
+        if problem.passing is None:
+            return initial.points
+        guide = problem.passing.guide
+        led = np.column_stack([np.interp(initial.greville, guide.t, guide.position[:, k]) for k in (0, 1)])
+        led[: self.degree] = initial.points[: self.degree]
+        return led
+
+    def _minimise_deformation(
+        self,
+        problem: RepairProblem,
+        initial: UniformBSpline,
+        start: Array,
+        pairs: Pairs,
+        collision: float,
+        deadline: float | None,
+    ) -> _Minimum:
+        config, n = self.config, len(initial.points)
+        axes = [0, 1] if problem.lateral else [0]
+        cached = _deformation_structure(n, self.degree, self.spacing, config.deform.smooth, config.precondition)
+        feasibility = _feasibility(n, problem.limits, self._feasibility_key(), config.deform.feasible)
+        pairs = pairs if problem.lateral else Pairs(*(c[pairs.axis == 0] for c in pairs))
+        free, fixed = cached.free, slice(0, cached.free.start)
+        head = initial.points[fixed]
+        # Minimiser of the quadratic part: the straight line that the fixed points begin.
+        centre = np.linalg.solve(cached.hessian[free, free], -cached.hessian[free, fixed] @ head)
+        base = np.vstack([head, centre])
+        cost = _Cost(base, cached, feasibility, axes, pairs, collision, deadline)
+        if not problem.lateral:
+            cost.base[:, 1] = initial.points[:, 1]
+        y0 = np.linalg.solve(cached.factor_inv, start[free] - base[free])[:, axes].ravel()
+        y, value, iterations, converged = self._lbfgs(cost, y0)
+        return _Minimum(cost.points(y), value, iterations, converged)
+
+    def _feasibility_key(self) -> tuple[float, ...]:
+        c = self.config
+        return (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
+
+    def _lbfgs(self, cost: _Cost, y0: Array) -> tuple[Array, float, int, bool]:
+        from scipy.optimize import fmin_l_bfgs_b
+
+        config = self.config
+        y, value, info = fmin_l_bfgs_b(
+            cost, y0, maxiter=config.max_iterations, pgtol=config.tolerance, factr=1e1, m=10, maxls=40
+        )
+        return y, float(value), int(info["nit"]), info["warnflag"] != 1
+
+    # -- refinement ------------------------------------------------------------------------------
+
+    def _refine(
+        self, problem: RepairProblem, initial: UniformBSpline, deformed: _Minimum, deadline: float | None
+    ) -> _Minimum:
+        """Minimise J' from the deformed curve; both axes are coupled by the fitting term."""
+        config, n, p = self.config, len(initial.points), self.degree
+        if n <= 2 * p:
+            return deformed
+        axes = [0, 1] if problem.lateral else [0]
+        quadratic = _fitting_quadratic(deformed.points, p, self.spacing, config.refine.fit)
+        smooth = _smoothness(n, self.spacing, config.refine.smooth)
+        quadratic[0, :, 0, :] += smooth
+        quadratic[1, :, 1, :] += smooth
+        feasibility = _feasibility(n, problem.limits, self._feasibility_key(), config.refine.feasible)
+        free = slice(p, n - p)
+        cost = _RefineCost(deformed.points, quadratic, smooth, feasibility, _stack(n, self.spacing), free, axes,
+                           config.precondition, deadline)  # fmt: skip
+        # Where no limit is touched J' is quadratic and its minimiser is a closed form.
+        points = cost.points(cost.origin)
+        if feasibility.evaluate(cost.stack @ points)[1] is None:
+            return _Minimum(points, cost(cost.origin)[0], 0, True)
+        y, value, iterations, converged = self._lbfgs(cost, cost.origin)
+        return _Minimum(cost.points(y), value, iterations, converged)
+
+
+class _Cost:
+    """J over the preconditioned coordinates y (flattened (m, axes))."""
+
+    def __init__(
+        self,
+        base: Array,
+        cached: _Quadratic,
+        feasibility: Feasibility,
+        axes: list[int],
+        pairs: Pairs,
+        collision: float,
+        deadline: float | None,
+    ) -> None:
+        self.base = base.copy()
+        self.cached, self.feasibility, self.axes, self.deadline = cached, feasibility, axes, deadline
+        self.pairs, self.collision = pairs, collision
+        self.base_derivatives = cached.stack @ self.base
+        # Along l without lateral freedom the reference stands, and its penalties are constants.
+        self.w = cached.factor_inv
+        self.stack_w = cached.stack[:, cached.free] @ self.w
+        self.curvature = self.w.T @ cached.hessian[cached.free, cached.free] @ self.w
+        residual = 0.5 * float(np.sum(self.base * (cached.hessian @ self.base)))
+        self.constant = residual
+        self.pair_w = self.w[pairs.row - cached.free.start]
+        self.pair_base = self.base[pairs.row, pairs.axis]
+
+    def points(self, y: Array) -> Array:
+        """Control points (n, 2) at the coordinates y."""
+        points = self.base.copy()
+        points[self.cached.free, self.axes] += self.w @ y.reshape(-1, len(self.axes))
+        return points
+
+    def __call__(self, y: Array) -> tuple[float, Array]:
+        if self.deadline is not None and time.perf_counter() > self.deadline:
+            raise _OutOfTime
+        moved = y.reshape(-1, len(self.axes))
+        gradient = self.curvature @ moved
+        value = self.constant + 0.5 * float(np.vdot(moved, gradient))
+        derivatives = self.base_derivatives.copy()
+        derivatives[:, self.axes] += self.stack_w @ moved
+        penalty, slope = self.feasibility.evaluate(derivatives)
+        if slope is not None:
+            value += penalty
+            gradient += self.stack_w.T @ slope[:, self.axes]
+        pairs = self.pairs
+        if pairs.row.size:
+            where = self.pair_base + np.einsum("ij,ij->i", self.pair_w, moved[:, pairs.axis].T)
+            excess = pairs.threshold - pairs.sign * (where - pairs.anchor)
+            cost, rate = cubic_quadratic(excess, pairs.threshold)
+            value += self.collision * float(cost.sum())
+            pull = -self.collision * pairs.sign * rate
+            for k in range(len(self.axes)):
+                own = pairs.axis == k
+                gradient[:, k] += self.pair_w[own].T @ pull[own]
+        return value, gradient.ravel()
+
+
+class _RefineCost:
+    """J' over preconditioned coordinates; ``origin`` is the minimiser of its quadratic part."""
+
+    def __init__(
+        self,
+        deformed: Array,
+        quadratic: Array,
+        smooth: Array,
+        feasibility: Feasibility,
+        stack: Array,
+        free: slice,
+        axes: list[int],
+        precondition: bool,
+        deadline: float | None,
+    ) -> None:
+        self.deformed, self.stack, self.feasibility = deformed, stack, feasibility
+        self.free, self.axes, self.deadline = free, axes, deadline
+        m, k = free.stop - free.start, len(axes)
+        block = quadratic[np.ix_(axes, range(free.start, free.stop), axes, range(free.start, free.stop))]
+        hessian = block.reshape(k * m, k * m)
+        # The fitting term vanishes at the deformed curve; only smoothness has a slope there.
+        slope = (smooth @ deformed)[free, axes].T.ravel()
+        self.constant = 0.5 * float(np.sum(deformed * (smooth @ deformed)))
+        factor = np.linalg.cholesky(hessian) if precondition else np.eye(k * m)
+        self.w = np.linalg.inv(factor).T
+        self.slope = self.w.T @ slope
+        self.curvature = self.w.T @ hessian @ self.w
+        self.origin = -np.linalg.solve(self.curvature, self.slope)
+        self.stack_w = np.einsum("rn,knx->krx", stack[:, free], self.w.reshape(k, m, k * m))
+        self.base_derivatives = stack @ deformed
+
+    def points(self, y: Array) -> Array:
+        """Control points (n, 2) at the coordinates y."""
+        points = self.deformed.copy()
+        points[self.free, self.axes] += (self.w @ y).reshape(len(self.axes), -1).T
+        return points
+
+    def __call__(self, y: Array) -> tuple[float, Array]:
+        if self.deadline is not None and time.perf_counter() > self.deadline:
+            raise _OutOfTime
+        bent = self.curvature @ y
+        gradient = self.slope + bent
+        value = self.constant + float(y @ (self.slope + 0.5 * bent))
+        derivatives = self.base_derivatives.copy()
+        derivatives[:, self.axes] += (self.stack_w @ y).T
+        penalty, slope = self.feasibility.evaluate(derivatives)
+        if slope is not None:
+            value += penalty
+            gradient = gradient + np.einsum("krx,rk->x", self.stack_w, slope[:, self.axes])
+        return value, gradient
+
+
+@lru_cache(maxsize=64)
+def _knot_basis(n: int, degree: int, spacing: float) -> tuple[Array, Array]:
+    tau = np.arange(n - degree + 1) * spacing
+    return frozen(basis_matrix(tau, n, degree, spacing)), frozen(basis_matrix(tau, n, degree, spacing, 1))
+
+
+def _fitting_quadratic(points: Array, degree: int, spacing: float, weight: float) -> Array:
+    """Hessian (2, n, 2, n) of lambda_f J_f around the deformed curve.
+
+    J_f sums over the knots the displacement from the deformed curve, split along its direction of
+    travel (axial, divided by 5) and across it: d_a**2 / 25 + d_r**2 (EGO-Planner, eq. 12-13).
+    """
+    basis, rate = _knot_basis(len(points), degree, spacing)
+    velocity = rate @ points
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    # A standing curve has no direction of its own; the lane's is taken.
+    moving = speed > 1e-3
+    along = np.where(moving[:, None], velocity / np.where(moving, speed, 1.0)[:, None], [1.0, 0.0])
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    metric = along[:, :, None] * along[:, None, :] / 25.0 + across[:, :, None] * across[:, None, :]
+    return np.asarray(2.0 * weight * np.einsum("ki,kab,kj->aibj", basis, metric, basis, optimize=True))
+
+
+def make(config: Config) -> EgoBackend:
+    """The backend as the configuration describes it."""
+    return EgoBackend(config.ego, degree=config.repair.degree, spacing=config.repair.spacing)

@@ -1,0 +1,35 @@
+"""What all tests share: one thread, reproducible Hypothesis, and the folder of CommonRoad files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# Nothing has imported NumPy yet. A second BLAS thread makes the small dense algebra here slower, not faster.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["MPLBACKEND"] = "Agg"
+
+settings.register_profile("repair", derandomize=True, deadline=None, max_examples=50)
+settings.load_profile("repair")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark every test that reads scenario files, so that `-m "not scenarios"` leaves it out."""
+    for item in items:
+        if "scenarios" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.scenarios)
+
+
+@pytest.fixture(scope="session")
+def scenarios() -> Path:
+    """Return the folder COMMONROAD_SCENARIOS of CommonRoad files; without it skip, or fail when CI is set."""
+    value = os.environ.get("COMMONROAD_SCENARIOS")
+    if value and any(Path(value).glob("*.xml")):
+        return Path(value).resolve()
+    problem = f"no *.xml file in COMMONROAD_SCENARIOS={value}" if value else "COMMONROAD_SCENARIOS is not set"
+    if os.environ.get("CI", "").lower() in ("", "0", "false"):
+        pytest.skip(problem)
+    pytest.fail(f"{problem}, and CI is set", pytrace=False)
