@@ -142,7 +142,9 @@ class CollisionWorld:
         change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(weight > 0.0, left + weight * change, left)
 
-    def first_collision(self, x: Array, y: Array, orientation: Array, start: int = 0) -> tuple[float, int] | None:
+    def first_collision(
+        self, x: Array, y: Array, orientation: Array, start: int = 0
+    ) -> tuple[float, int] | None:
         """Time [s] and obstacle id of the first collision, or None; arguments as in :meth:`contact`."""
         found = self._first(x, y, orientation, start)
         if found is None:
@@ -188,7 +190,9 @@ class CollisionWorld:
         states = self._obstacles[index].states
         low, high = int(self._before[sample]), int(self._after[sample])
         weight = sample % self.substeps / self.substeps
-        centre = states[low, :2] if low == high else (1 - weight) * states[low, :2] + weight * states[high, :2]
+        centre = (
+            states[low, :2] if low == high else (1 - weight) * states[low, :2] + weight * states[high, :2]
+        )
         first = min(low, len(states) - 2) if len(states) > 1 else 0
         velocity = np.zeros(2) if len(states) < 2 else (states[first + 1, :2] - states[first, :2]) / self.dt
         if not np.isfinite(velocity).all():
@@ -213,10 +217,13 @@ class CollisionWorld:
         cos, sin = np.cos(orientation[k]), np.sin(orientation[k])
         forward = cos * dx[k, m] + sin * dy[k, m]
         left = cos * dy[k, m] - sin * dx[k, m]
-        hit = _rectangles_touch(forward, left, poses[:, 2] - orientation[k], self._half, poses[:, 3], poses[:, 4])
+        hit = _rectangles_touch(
+            forward, left, poses[:, 2] - orientation[k], self._half, poses[:, 3], poses[:, 4]
+        )
         if (kind != _RECTANGLE).any():
             beyond = np.hypot(
-                np.maximum(np.abs(forward) - self._half[0], 0.0), np.maximum(np.abs(left) - self._half[1], 0.0)
+                np.maximum(np.abs(forward) - self._half[0], 0.0),
+                np.maximum(np.abs(left) - self._half[1], 0.0),
             )
             hit = np.where(kind == _RECTANGLE, hit, beyond <= poses[:, 3] + _TOUCH)
             for i in np.flatnonzero(hit & (kind == _POLYGON)):
@@ -283,7 +290,9 @@ def _polygon_touches(
     """Whether the ego at ``x, y, cos, sin`` meets a convex polygon (V, 2): separating axes."""
     x, y, cos, sin = pose
     points = (polygon - (x, y)) @ np.array([[cos, -sin], [sin, cos]])  # seen from the ego
-    if (points.min(axis=0) > np.add(half, _TOUCH)).any() or (points.max(axis=0) < -np.add(half, _TOUCH)).any():
+    if (points.min(axis=0) > np.add(half, _TOUCH)).any() or (
+        points.max(axis=0) < -np.add(half, _TOUCH)
+    ).any():
         return False
     edges = np.roll(points, -1, axis=0) - points
     size = np.hypot(edges[:, 0], edges[:, 1])
@@ -341,13 +350,14 @@ class RoadBoundary:
         return self.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
 
     def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
-        """Corners of the ego's rectangle, (K, 4, 2)."""
+        """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
         cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
         forward, left = self._corners[:, 0], self._corners[:, 1]
-        return np.stack((x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left), axis=2)
+        corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
+        return np.nan_to_num(np.stack(corners, axis=2), nan=1e12, posinf=1e12, neginf=-1e12)
 
     def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
-        """As :meth:`first_off_road`, by the drivability checker's triangulation (built at the first call).
+        """As :meth:`first_off_road`, by the drivability checker's triangulation, built at the first call.
 
         The two differ only next to ends of the map: the triangulation has no edge across the end of a
         section that has successors, and a triangle may reach into the road there. None also where the
@@ -357,12 +367,14 @@ class RoadBoundary:
             return None
         import shapely
 
-        hits = self._triangles.query(shapely.polygons(self._outline(x, y, orientation)), predicate="intersects")
+        hits = self._triangles.query(
+            shapely.polygons(self._outline(x, y, orientation)), predicate="intersects"
+        )
         return int(hits[0].min()) if hits.size else None
 
     @property
     def official_available(self) -> bool:
-        """Whether the drivability checker can triangulate this road: it fails on some, or lacks ``triangle``."""
+        """Whether the checker can triangulate this road: it fails on some, or lacks ``triangle``."""
         if self._triangles is None:
             import shapely
             from commonroad_dc.boundary import construction

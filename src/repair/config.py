@@ -91,7 +91,7 @@ class DeformWeights:
     """lambda_s, lambda_c, lambda_d."""
 
     smooth: float = 1.0
-    collision: float = 15.0
+    collision: float = 1000.0
     feasible: float = 1.0
 
 
@@ -101,7 +101,7 @@ class RefineWeights:
 
     smooth: float = 1.0
     feasible: float = 1.0
-    fit: float = 0.01
+    fit: float = 1.0
 
 
 @dataclass
@@ -120,6 +120,7 @@ class EgoConfig:
     tolerance: float = 0.01
     rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
     precondition: bool = True
+    guard: bool = True  # keep the deformed curve where refining it would bring back a collision
 
 
 @dataclass

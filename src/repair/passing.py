@@ -156,6 +156,7 @@ def open_passings(
     limits: Limits,
     margin: float,
     lateral: bool,
+    curvature: tuple[Array, Array],
 ) -> tuple[Passing, ...]:
     """The open ways past the obstacles, the gentlest of each manoeuvre, cheapest first.
 
@@ -173,11 +174,14 @@ def open_passings(
         Distance to the inflated boxes that a guide keeps [m].
     lateral : bool
         Whether moving sideways is allowed.
+    curvature : (s, kappa) arrays
+        Curvature of the path, for the lateral acceleration.
 
     Returns
     -------
     tuple of Passing
-        Empty where every manoeuvre of the family collides.
+        Where every manoeuvre of the family collides or is too fast for the path, the single one
+        that comes closest: it is for the backend and the checker to find that it does not do.
     """
     tau = reference.t - reference.t[0]
     lower, upper = occupancy.at(reference.t)
@@ -186,20 +190,33 @@ def open_passings(
         start, tau, reference, lower, upper, conflict, limits, bounds, margin + 0.05, lateral
     )
     speeds = _speed_profiles(start, tau, limits)
+    # Braking in a bend is bound by the friction circle; a guide leaves a tenth of it.
+    bend = np.abs(speeds.v**2 * np.interp(speeds.s, *curvature))
+    excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat).max(axis=1)
+    excess = np.maximum(excess, 0.0)
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
+    closest: tuple[float, int, _LateralProfile, Maneuver] | None = None
     for profile in profiles:
         overlap = (lower[..., 1] - margin < profile.l) & (profile.l < upper[..., 1] + margin)
-        behind = speeds.s[:, None, :] < lower[None, :, :, 0] - margin
-        ahead = speeds.s[:, None, :] > upper[None, :, :, 0] + margin
-        free = ~(overlap & ~(behind | ahead)).any(axis=(1, 2))
-        kinds = _kinds(profile, conflict, overlap, ahead, speeds)
+        behind = lower[None, :, :, 0] - margin - speeds.s[:, None, :]
+        ahead = speeds.s[:, None, :] - upper[None, :, :, 0] - margin
+        depth = np.where(overlap, np.minimum(-behind, -ahead), 0.0).max(axis=(1, 2), initial=0.0)
+        free = (depth <= 0.0) & (excess <= 0.0)
         cost = speeds.cost + profile.cost
-        for maneuver, members in kinds.items():
+        for maneuver, members in _kinds(profile, conflict, overlap, ahead > 0.0, speeds).items():
             usable = np.flatnonzero(free & members)
             if len(usable):
                 p = int(usable[np.argmin(cost[usable])])
                 if maneuver not in best or cost[p] < best[maneuver][0]:
                     best[maneuver] = (float(cost[p]), p, profile)
+            elif profile.maneuver is None and members.any():
+                badness = np.where(members, 10.0 * depth + excess, np.inf)
+                p = int(np.argmin(badness))
+                if closest is None or badness[p] < closest[0]:
+                    closest = (float(badness[p]), p, profile, maneuver)
+    if not best and closest is not None:
+        badness_, p, profile, maneuver = closest
+        best[maneuver] = (1e3 + badness_, p, profile)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
         for maneuver, (cost, p, profile) in best.items()

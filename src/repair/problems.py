@@ -11,7 +11,7 @@ import numpy as np
 from repair.config import Config, LimitsConfig
 from repair.occupancy import relevant
 from repair.passing import open_passings
-from repair.types import Array, Curve, LateralBounds, Limits, Occupancy, RepairProblem, frozen
+from repair.types import Array, Curve, LateralBounds, Limits, Maneuver, Occupancy, RepairProblem, frozen
 
 if TYPE_CHECKING:
     from repair.scene.commonroad import Scene
@@ -95,10 +95,10 @@ class ProblemFactory:
         reference = self.reference.sample(times)
         start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
         occupancy = self._within_reach(start, t_rep, reference.position, lateral)
-        passings = open_passings(
-            reference, start, occupancy, self.bounds, self.limits, settings.margin, lateral
-        )
         s, curvature = self._axis
+        passings = open_passings(
+            reference, start, occupancy, self.bounds, self.limits, settings.margin, lateral, (s, curvature)
+        )
         return tuple(
             RepairProblem(
                 reference=self.reference,
@@ -114,7 +114,9 @@ class ProblemFactory:
                 curvature_s=s,
                 curvature=curvature,
                 dt=step,
-                lateral=lateral,
+                # Who keeps the path needs no sideways freedom, and without it the vehicle can be
+                # brought to a stop on any path that it can drive at all.
+                lateral=lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings
         )

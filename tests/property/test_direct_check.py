@@ -21,7 +21,11 @@ def choose(kind, vehicle, dt, rng):
     if kind == "low_speed":
         v = rng.uniform(0, 1) ** 2
     elif kind == "standstill":
-        v, delta, a = 0.01 * rng.uniform() * rng.integers(2), rng.uniform(-limit, limit), abs(a) * rng.integers(2)
+        v, delta, a = (
+            0.01 * rng.uniform() * rng.integers(2),
+            rng.uniform(-limit, limit),
+            abs(a) * rng.integers(2),
+        )
     elif kind == "v_switch":
         v, a = vehicle.v_switch + 0.5 * rng.normal(), rng.uniform(-a_max, a_max)
     elif kind == "engine":
@@ -32,7 +36,11 @@ def choose(kind, vehicle, dt, rng):
     elif kind == "reverse":
         v = -rng.uniform(0, 3)
     elif kind == "steering_limit":
-        v, delta, u = rng.uniform(0, 6), rng.choice([-1, 1]) * limit * rng.uniform(0.85, 1.0), rng.uniform(-rate, rate)
+        v, delta, u = (
+            rng.uniform(0, 6),
+            rng.choice([-1, 1]) * limit * rng.uniform(0.85, 1.0),
+            rng.uniform(-rate, rate),
+        )
     elif kind == "starts_at_limit":
         v, delta = rng.uniform(0, 8), rng.choice([-1, 1]) * limit
         u = -np.sign(delta) * abs(rng.normal()) * 0.3
@@ -62,7 +70,9 @@ def simulate(state, u, a, dt, vehicle, n=20):
             rate = 0.0
         top = vehicle.a_max * (vehicle.v_switch / s[3] if s[3] > vehicle.v_switch else 1.0)
         yaw_rate = s[3] * np.tan(s[2]) / vehicle.wheelbase
-        return np.array([s[3] * np.cos(s[4]), s[3] * np.sin(s[4]), rate, np.clip(a, -vehicle.a_max, top), yaw_rate])
+        return np.array(
+            [s[3] * np.cos(s[4]), s[3] * np.sin(s[4]), rate, np.clip(a, -vehicle.a_max, top), yaw_rate]
+        )
 
     for _ in range(n):
         state = state + h * derivative(state + 0.5 * h * derivative(state))
@@ -80,7 +90,12 @@ def transition(kind, vehicle, dt, rng):
         end = end + rng.normal(size=5) * (1, 1, 0.5, 1, 1) * 10.0 ** rng.uniform(-4, -1)
     x, y, steering, speed, psi = np.array([start, end]).T
     return DrivenStates(
-        np.array([0.0, dt]), x + vehicle.rear * np.cos(psi), y + vehicle.rear * np.sin(psi), steering, speed, psi
+        np.array([0.0, dt]),
+        x + vehicle.rear * np.cos(psi),
+        y + vehicle.rear * np.sin(psi),
+        steering,
+        speed,
+        psi,
     )
 
 
@@ -131,3 +146,10 @@ def test_ordinary_driving_is_accepted_without_asking(type_id, dt):
     report = direct_check(states, dt, vehicle)
     assert report.ok.all(), report.margin.min()
     assert official_check(states, dt, vehicle, range(0, 50, 10)).ok.all()
+
+
+def test_far_from_the_origin_the_checker_decides():
+    states = DrivenStates(*np.array([[0, 0.1], [2e6, 2e6 + 1.0], [5e6, 5e6], [0, 0], [10, 10], [0, 0]]))
+    report = direct_check(states, 0.1, load_vehicle(1))
+    assert not report.ok[0]
+    assert report.limit(0) == "position"

@@ -135,6 +135,7 @@ def load_scene(
     vehicle: int = 1,
     horizon: float | None = None,
     after_prediction: str = "remove",
+    smoothing: float = 0.15,
 ) -> Scene:
     """Read a CommonRoad XML file and make a scene of one planning problem in it.
 
@@ -151,6 +152,8 @@ def load_scene(
     after_prediction : str
         ``remove``, ``hold`` or ``constant_velocity``: what becomes of an obstacle after its
         prediction.
+    smoothing : float
+        How far smoothing may move the route's centre line [m]; more of it means gentler curves.
 
     Raises
     ------
@@ -165,8 +168,9 @@ def load_scene(
     try:
         problem, note = _select(contents.problems, planning_problem)
         scene = scene_from_scenario(
-            contents.scenario, problem, vehicle=vehicle, horizon=horizon, after_prediction=after_prediction
-        )
+            contents.scenario, problem, vehicle=vehicle, horizon=horizon, after_prediction=after_prediction,
+            smoothing=smoothing,
+        )  # fmt: skip
     except ScenarioError as error:
         raise ScenarioError(f"{contents.path.name}: {error}") from error
     return replace(
@@ -193,14 +197,19 @@ def scene_from_scenario(
     vehicle: int = 1,
     horizon: float | None = None,
     after_prediction: str = "remove",
+    smoothing: float = 0.15,
 ) -> Scene:
     """Make a scene of a CommonRoad scenario and planning problem in memory; see :func:`load_scene`."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=r"(commonroad|shapely|google)\.")
-        return _build(scenario, planning_problem, load_vehicle(vehicle), horizon, after_prediction)
+        return _build(scenario, planning_problem, load_vehicle(vehicle), horizon, after_prediction, smoothing)
 
 
-def _build(scenario: Any, problem: Any, vehicle: Vehicle, horizon: float | None, after: str) -> Scene:
+def _build(
+    scenario: Any, problem: Any, vehicle: Vehicle, horizon: float | None, after: str, smoothing: float
+) -> Scene:
+    if not (np.isfinite(smoothing) and smoothing > 0.0):
+        raise ConfigError(f"smoothing is {smoothing!r} m; it has to be positive")
     dt = float(scenario.dt)
     if not (np.isfinite(dt) and dt > 0.0):
         raise ScenarioError(f"the time step is {dt!r} s; it has to be positive")
@@ -214,7 +223,7 @@ def _build(scenario: Any, problem: Any, vehicle: Vehicle, horizon: float | None,
     ahead = float(np.clip(speed * duration + duration**2 + 40.0, 80.0, _ROUTE_MAX))
     position = np.array([ego.x, ego.y])
     route = plan_route(lanes, position, ego.orientation, problem.goal, speed=speed, ahead=ahead)
-    lead_in = drive_path(route.center, position, ego.orientation, speed, vehicle)
+    lead_in = drive_path(route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing)
     frame, s0 = lead_in.frame, lead_in.start
     notes += [*route.notes, *lead_in.notes]
     if route.road_ends and frame.length - s0 < speed * duration:
@@ -223,6 +232,7 @@ def _build(scenario: Any, problem: Any, vehicle: Vehicle, horizon: float | None,
     obstacles, recorded, remarks = obstacles_of(
         scenario, first_step=first_step, n_steps=n_steps, after_prediction=after,
         is_ego=partial(_is_ego, ego=ego, first_step=first_step, vehicle=vehicle),
+        ego_id=int(problem.planning_problem_id), ego_speed=ego.velocity,
     )  # fmt: skip
     found = crossings(frame, lanes)
     half = vehicle.width / 2.0

@@ -107,7 +107,7 @@ class FrenetFrame:
         points: npt.ArrayLike,
         *,
         spacing: float = 1.0,
-        smoothing: float = 0.1,
+        smoothing: float = 0.15,
         max_lateral: float = 60.0,
     ) -> FrenetFrame:
         """Smooth a polyline and lay the frame along it.
@@ -342,7 +342,7 @@ def _smooth(path: Array, tolerance: float) -> Array:
             band[i - j, j : j + count - 3] += difference[i] * difference[j]
     identity = np.ones(count)
     identity[[0, -1]] = 1e9
-    weights = 4.0 ** np.arange(9.0, -5.0, -1.0)
+    weights = 2.0 ** np.arange(18.0, -10.0, -1.0)
     for weight in weights:
         matrix = weight * band
         matrix[0] += identity

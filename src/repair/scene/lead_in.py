@@ -35,9 +35,9 @@ def largest_curvature(vehicle: Vehicle) -> float:
     return float(np.sin(slip) / vehicle.rear)
 
 
-def route_frame(center: Array) -> tuple[FrenetFrame, float]:
-    """Frame along a centre line, smoothed as little as its kinks allow; also the tolerance used [m]."""
-    for tolerance in (0.1, 0.15, 0.25, 0.5, 1.0):
+def _route_frame(center: Array, smoothing: float) -> tuple[FrenetFrame, float]:
+    """Frame along a centre line, smoothed harder only where its kinks ask for it; also the tolerance used [m]."""
+    for tolerance in (smoothing, *(t for t in (0.25, 0.5, 1.0) if t > smoothing)):
         frame = FrenetFrame.from_points(center, smoothing=tolerance)
         if np.max(np.abs(frame.curvature_table)) <= _SHARP:
             break
@@ -129,7 +129,9 @@ def _wrapped(angle: float) -> float:
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def drive_path(center: Array, position: Array, orientation: float, speed: float, vehicle: Vehicle) -> LeadIn:
+def drive_path(
+    center: Array, position: Array, orientation: float, speed: float, vehicle: Vehicle, *, smoothing: float = 0.15
+) -> LeadIn:
     """Lay the frame along the path from the ego's pose onto the centre line.
 
     In the route's own frame the path is a quintic l(s) from the ego's offset, direction and the
@@ -145,15 +147,17 @@ def drive_path(center: Array, position: Array, orientation: float, speed: float,
     orientation, speed : float
         Initial orientation [rad] and speed [m/s].
     vehicle : Vehicle
+    smoothing : float
+        How far smoothing may move the centre line [m]; more only to take out kinks (noted).
 
     Raises
     ------
     ScenarioError
         If the start cannot be projected on the route, or no drivable path leads onto it.
     """
-    frame, tolerance = route_frame(center)
+    frame, tolerance = _route_frame(center, smoothing)
     notes = []
-    if tolerance > 0.15:
+    if tolerance > smoothing:
         notes.append(f"kinks of the centre line were smoothed by up to {tolerance:g} m")
     limit = 0.8 * largest_curvature(vehicle)
     s0, l0 = frame.to_frenet(np.asarray(position)[None])[0]

@@ -307,7 +307,7 @@ def _polygons(item: _Placed) -> tuple[Array, ...]:
 
 
 def _union(first: _Placed, second: _Placed) -> _Placed:
-    if first == second or first is second:
+    if not (first.polygons or second.polygons) and first == second:
         return first
     return _Placed(None, None, _polygons(first) + _polygons(second), second.state)
 
@@ -417,6 +417,8 @@ def obstacles_of(
     n_steps: int,
     after_prediction: str = "remove",
     is_ego: Callable[[Any], bool] = lambda obstacle: False,
+    ego_id: int | None = None,
+    ego_speed: float = np.nan,
 ) -> tuple[tuple[Obstacle, ...], Obstacle | None, list[str]]:
     """Read every obstacle of a scenario.
 
@@ -430,7 +432,10 @@ def obstacles_of(
     after_prediction : str
         What becomes of an obstacle after its prediction: ``remove``, ``hold`` or ``constant_velocity``.
     is_ego : callable
-        Recognises the ego's own recording among the dynamic obstacles.
+        Recognises the ego's own recording among the dynamic obstacles by its start.
+    ego_id, ego_speed
+        The planning problem's id and initial speed [m/s]: a trajectory obstacle with that id (ids
+        are unique in CommonRoad) and speed is the ego's recording from a later start, and left out.
 
     Returns
     -------
@@ -470,6 +475,8 @@ def obstacles_of(
         if role == "dynamic" and ego is None and is_ego(obstacle):
             ego = made
             notes.append(f"obstacle {name} is the ego's own recording and is left out")
+        elif role == "dynamic" and name == ego_id and abs(np.nan_to_num(made.states[0, 3], nan=1e9) - ego_speed) < 1.0:
+            notes.append(f"obstacle {name} has the planning problem's id and the ego's speed: a copy, left out")
         else:
             found.append(made)
     return tuple(found), ego, notes

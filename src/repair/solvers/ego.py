@@ -10,7 +10,7 @@ identity (a Cholesky preconditioner), which changes the path of L-BFGS and not i
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -129,6 +129,21 @@ def _feasibility(n: int, limits: Limits, config: tuple[float, ...], scale: float
     return feasibility_bounds(n, maxima, minima, weights, elastic, joint, reverse)
 
 
+def _closest(pairs: Pairs, points: Array) -> float:
+    """Smallest obstacle distance of all pairs, inf without any."""
+    return float(pairs.distance(points).min()) if pairs.row.size else float("inf")
+
+
+def _standing(points: Array, degree: int) -> Array:
+    """Stand instead of rolling back: what is left of a reversing motion becomes a standstill.
+
+    Non-decreasing control points make the speed non-negative on the whole curve (convex hull).
+    """
+    result = points.copy()
+    result[degree - 1 :, 0] = np.maximum.accumulate(points[degree - 1 :, 0])
+    return frozen(result)
+
+
 class _OutOfTime(Exception):
     pass
 
@@ -181,8 +196,11 @@ class EgoBackend:
         initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, self.spacing)
         built = time.perf_counter()
         try:
-            deformed, rounds = self._deform(problem, initial, deadline)
-            refined = self._refine(problem, initial, deformed, deadline)
+            feasibility = self._bounds(problem, initial)
+            deformed, pairs, rounds = self._deform(problem, initial, feasibility, deadline)
+            refined = self._refine(problem, initial, deformed, feasibility, deadline)
+            if self.config.guard and _closest(pairs, refined.points) < min(0.0, _closest(pairs, deformed.points)):
+                refined = deformed
         except _OutOfTime:
             now = time.perf_counter()
             return SolveResult(
@@ -190,8 +208,8 @@ class EgoBackend:
                 detail=f"time limit of {time_limit:g} s",
             )  # fmt: skip
         curves = {
-            "deformation": UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(deformed.points)),
-            "refinement": UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(refined.points)),
+            name: UniformBSpline(problem.t_rep, self.spacing, self.degree, _standing(minimum.points, self.degree))
+            for name, minimum in (("deformation", deformed), ("refinement", refined))
         }
         converged = deformed.converged and refined.converged
         return SolveResult(
@@ -209,8 +227,9 @@ class EgoBackend:
     # -- deformation -----------------------------------------------------------------------------
 
     def _deform(
-        self, problem: RepairProblem, initial: UniformBSpline, deadline: float | None
-    ) -> tuple[_Minimum, int]:
+        self, problem: RepairProblem, initial: UniformBSpline, feasibility: tuple[Feasibility, Feasibility],
+        deadline: float | None,
+    ) -> tuple[_Minimum, Pairs, int]:
         """Minimise J; while control points still collide, double lambda_c and start again."""
         config = self.config
         collision = config.deform.collision
@@ -218,13 +237,14 @@ class EgoBackend:
         points = initial.points
         for round_ in range(config.rebounds + 1):
             pairs = anchor_pairs(problem, initial.greville, shape, self.degree)
-            minimum = self._minimise_deformation(problem, initial, points, pairs, collision, deadline)
-            if pairs.row.size == 0 or pairs.distance(minimum.points).min() >= 0.0:
+            minimum = self._minimise_deformation(
+                problem, initial, points, pairs, collision, feasibility[0], deadline
+            )
+            if _closest(pairs, minimum.points) >= 0.0:
                 break
             collision *= 2.0
             points = minimum.points
-            shape = np.where(np.isnan(shape), points, shape)
-        return minimum, round_ + 1
+        return minimum, pairs, round_ + 1
 
     def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
         """Where the guide leads the control points (the reference where there is no guide)."""
@@ -242,12 +262,12 @@ class EgoBackend:
         start: Array,
         pairs: Pairs,
         collision: float,
+        feasibility: Feasibility,
         deadline: float | None,
     ) -> _Minimum:
         config, n = self.config, len(initial.points)
         axes = [0, 1] if problem.lateral else [0]
         cached = _deformation_structure(n, self.degree, self.spacing, config.deform.smooth, config.precondition)
-        feasibility = _feasibility(n, problem.limits, self._feasibility_key(), config.deform.feasible)
         pairs = pairs if problem.lateral else Pairs(*(c[pairs.axis == 0] for c in pairs))
         free, fixed = cached.free, slice(0, cached.free.start)
         head = initial.points[fixed]
@@ -261,9 +281,19 @@ class EgoBackend:
         y, value, iterations, converged = self._lbfgs(cost, y0)
         return _Minimum(cost.points(y), value, iterations, converged)
 
-    def _feasibility_key(self) -> tuple[float, ...]:
-        c = self.config
-        return (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
+    def _bounds(self, problem: RepairProblem, initial: UniformBSpline) -> tuple[Feasibility, Feasibility]:
+        """Bounds of both stages; in a bend the speed is bound by the lateral acceleration."""
+        c, n = self.config, len(initial.points)
+        key = (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
+        both = [_feasibility(n, problem.limits, key, scale) for scale in (c.deform.feasible, c.refine.feasible)]
+        led = self._led_points(problem, initial)[:-1, 0]
+        bend = np.abs(problem.curvature_at(led))
+        cap = np.sqrt(0.9 * problem.limits.a_lat / np.maximum(bend, 1e-9))
+        if (cap >= c.elastic * problem.limits.v_max).all():
+            return both[0], both[1]
+        upper = both[0].upper.copy()
+        upper[: n - 1, 0] = np.minimum(upper[: n - 1, 0], cap)
+        return replace(both[0], upper=upper), replace(both[1], upper=upper)
 
     def _lbfgs(self, cost: _Cost, y0: Array) -> tuple[Array, float, int, bool]:
         from scipy.optimize import fmin_l_bfgs_b
@@ -277,7 +307,12 @@ class EgoBackend:
     # -- refinement ------------------------------------------------------------------------------
 
     def _refine(
-        self, problem: RepairProblem, initial: UniformBSpline, deformed: _Minimum, deadline: float | None
+        self,
+        problem: RepairProblem,
+        initial: UniformBSpline,
+        deformed: _Minimum,
+        feasibility: tuple[Feasibility, Feasibility],
+        deadline: float | None,
     ) -> _Minimum:
         """Minimise J' from the deformed curve; both axes are coupled by the fitting term."""
         config, n, p = self.config, len(initial.points), self.degree
@@ -288,13 +323,12 @@ class EgoBackend:
         smooth = _smoothness(n, self.spacing, config.refine.smooth)
         quadratic[0, :, 0, :] += smooth
         quadratic[1, :, 1, :] += smooth
-        feasibility = _feasibility(n, problem.limits, self._feasibility_key(), config.refine.feasible)
         free = slice(p, n - p)
-        cost = _RefineCost(deformed.points, quadratic, smooth, feasibility, _stack(n, self.spacing), free, axes,
+        cost = _RefineCost(deformed.points, quadratic, smooth, feasibility[1], _stack(n, self.spacing), free, axes,
                            config.precondition, deadline)  # fmt: skip
         # Where no limit is touched J' is quadratic and its minimiser is a closed form.
         points = cost.points(cost.origin)
-        if feasibility.evaluate(cost.stack @ points)[1] is None:
+        if feasibility[1].evaluate(cost.stack @ points)[1] is None:
             return _Minimum(points, cost(cost.origin)[0], 0, True)
         y, value, iterations, converged = self._lbfgs(cost, cost.origin)
         return _Minimum(cost.points(y), value, iterations, converged)
