@@ -136,7 +136,7 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     l_offset = 0.5 * vehicle.width + _BODY_MARGIN if l_offset is None else l_offset
     with phases("occupancy"):
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset)
-    limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]))
+    limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
     with phases("checker"):
         checker = Checker(scene, limits, config.checker)
         touching = checker.touching_at_start()

@@ -41,10 +41,15 @@ def official_shifts(scenario: Any) -> dict[int, int]:
     """
     shifts = {}
     for obstacle in scenario.dynamic_obstacles:
-        occupancies = obstacle.prediction.occupancy_set if obstacle.prediction is not None else ()
-        if not occupancies:
+        prediction = obstacle.prediction
+        if prediction is None:
             continue
-        first = occupancies[0].time_step  # of a set this may be an interval
+        # A trajectory's occupancy set is computed when asked for, which takes far longer than its states.
+        trajectory = getattr(prediction, "trajectory", None)
+        parts = prediction.occupancy_set if trajectory is None else trajectory.state_list
+        if not parts:
+            continue
+        first = parts[0].time_step  # of a set this may be an interval
         placed = obstacle.initial_state.time_step + 1
         if not getattr(first, "start", first) <= placed <= getattr(first, "end", first):
             shifts[obstacle.obstacle_id] = int(placed - getattr(first, "start", first))
@@ -384,7 +389,7 @@ class RoadBoundary:
             except Exception:  # whatever goes wrong in there, there is no triangulation to ask
                 self._triangles = False
             else:
-                # As plain geometry: pycrcc objects that live until the interpreter's exit are reported as leaks.
+                # As plain geometry: pycrcc reports objects that live until the interpreter's exit as leaks.
                 corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
                 self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
         return self._triangles is not False

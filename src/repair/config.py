@@ -92,7 +92,7 @@ class DeformWeights:
 
     smooth: float = 1.0
     collision: float = 1000.0
-    feasible: float = 1.0
+    feasible: float = 100.0
 
 
 @dataclass
@@ -100,7 +100,7 @@ class RefineWeights:
     """lambda_s, lambda_d, lambda_f."""
 
     smooth: float = 1.0
-    feasible: float = 1.0
+    feasible: float = 100.0
     fit: float = 1.0
 
 
@@ -129,10 +129,11 @@ class CasadiConfig:
 
     solver: str = "ipopt"  # ipopt | sqpmethod
     obstacles: str = "hull"  # hull | sampled
-    hull: str = "bernstein"
     w_acceleration: float = 1.0
     w_jerk: float = 0.1
     w_reference: float = 0.05
+    heading: float = 0.7  # largest angle between the driven path and the axis [rad]
+    rounds: int = 5  # solves around the own solution until the exact constraints are kept
     max_iterations: int = 200
     tolerance: float = 1e-8
 
@@ -141,11 +142,25 @@ class CasadiConfig:
 class QptrConfig:
     """The Bernstein QP baseline."""
 
-    solver: str = "osqp"
+    solver: str = "osqp"  # any QP solver that qpsolvers finds: osqp | daqp | clarabel | ...
     degree: int = 5
-    spacing: float = 0.5
+    spacing: float = 0.5  # duration of a piece [s]
+    continuity: int = 2  # derivatives that are continuous at the joints
     w_jerk: float = 1.0
     w_deviation: float = 0.1
+
+
+@dataclass
+class EvasiveConfig:
+    """The fixed evasive manoeuvres behind the TTR of the paper's baseline."""
+
+    a_brake: float = 8.0  # full braking [m/s²]
+    a_kick: float = 8.0  # kick-down, as far as the engine goes [m/s²]
+    a_steer: float = 8.0  # steering: lateral acceleration [m/s²]
+    model: str = "point_mass"  # point_mass | kinematic
+    collision: str = "rectangles"  # rectangles | boxes
+    offset_max: float = 4.0  # widest lateral offset to steer to [m]
+    offset_step: float = 0.5  # [m]
 
 
 @dataclass
@@ -174,6 +189,7 @@ class Config:
     ego: EgoConfig = field(default_factory=EgoConfig)
     casadi: CasadiConfig = field(default_factory=CasadiConfig)
     qptr: QptrConfig = field(default_factory=QptrConfig)
+    evasive: EvasiveConfig = field(default_factory=EvasiveConfig)
     checker: CheckerConfig = field(default_factory=CheckerConfig)
     for_backend: dict[str, Any] = field(default_factory=dict)
 
@@ -188,6 +204,8 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "repair.lateral": ("none", "lane", "same_direction", "road"),
     "casadi.solver": ("ipopt", "sqpmethod"),
     "casadi.obstacles": ("hull", "sampled"),
+    "evasive.model": ("point_mass", "kinematic"),
+    "evasive.collision": ("rectangles", "boxes"),
     "checker.official": ("leftover", "always", "never"),
 }
 
@@ -225,11 +243,21 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "ego.max_iterations": (1, 100_000),
     "ego.tolerance": (1e-12, 1e3),
     "ego.rebounds": (0, 20),
+    "casadi.heading": (0.01, 1.4),
+    "casadi.rounds": (1, 100),
     "casadi.max_iterations": (1, 100_000),
     "casadi.tolerance": (1e-12, 1.0),
     "checker.substeps": (1, 50),
     "qptr.degree": (3, 9),
     "qptr.spacing": (0.05, 5.0),
+    "qptr.continuity": (2, 3),
+    "qptr.w_jerk": (1e-6, 1e6),
+    "qptr.w_deviation": (0.0, 1e6),
+    "evasive.a_brake": (0.1, 100.0),
+    "evasive.a_kick": (0.1, 100.0),
+    "evasive.a_steer": (0.1, 100.0),
+    "evasive.offset_max": (0.1, 20.0),
+    "evasive.offset_step": (0.05, 20.0),
 }
 
 

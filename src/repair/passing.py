@@ -31,6 +31,7 @@ __all__ = ["open_passings"]
 # Shares of the acceleration limits, and of the start speed, that are rolled out.
 _BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
 _THROTTLE = (0.5, 1.0)
+_DELAYS = (0.0, 1.5, 3.0)
 _HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
 
 
@@ -45,24 +46,25 @@ class _Rollouts:
 
 
 def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
-    """Change speed at a constant rate until a target speed, then hold it; never below standstill."""
+    """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
-    rates, targets = [0.0], [v0]
-    for share in _BRAKING:
-        for hold in _HOLD:
-            rates.append(share * limits.a_min)
-            targets.append(hold * v0)
-    for share in _THROTTLE:
-        for gain in (2.0, 5.0, 50.0):
-            rates.append(share * limits.a_max)
-            targets.append(min(v0 + gain, max(limits.v_max, v0)))
-    rate, target = np.array(rates)[:, None], np.array(targets)[:, None]
+    top = max(limits.v_max, v0)
+    family = [(0.0, 0.0, v0)]  # (delay, rate, target)
+    family += [(0.0, share * limits.a_min, hold * v0) for share in _BRAKING for hold in _HOLD]
+    family += [
+        (delay, share * limits.a_max, min(v0 + gain, top))
+        for share in _THROTTLE
+        for gain in (2.0, 5.0, 50.0)
+        for delay in _DELAYS
+        if delay < tau[-1]
+    ]
+    delay, rate, target = (column[:, None] for column in np.array(family).T)
     with np.errstate(divide="ignore", invalid="ignore"):
         change = np.where(rate == 0.0, 0.0, (target - v0) / np.where(rate == 0.0, 1.0, rate))
-    ramp = np.minimum(tau, change)
-    s = s0 + v0 * ramp + 0.5 * rate * ramp**2 + target * (tau - ramp)
+    ramp = np.clip(tau - delay, 0.0, change)
+    s = s0 + v0 * tau + 0.5 * rate * ramp**2 + (target - v0) * np.maximum(tau - delay - change, 0.0)
     v = v0 + rate * ramp
-    a = np.where(tau < change, rate, 0.0)
+    a = np.where((tau >= delay) & (tau < delay + change), rate, 0.0)
     loss = (s[:1, -1] - s[:, -1]) / max(tau[-1], 1.0)
     cost = np.mean(a**2, axis=1) + 0.01 * loss**2
     return _Rollouts(s, v, a, cost)
@@ -180,8 +182,8 @@ def open_passings(
     Returns
     -------
     tuple of Passing
-        Where every manoeuvre of the family collides or is too fast for the path, the single one
-        that comes closest: it is for the backend and the checker to find that it does not do.
+        Where no manoeuvre that keeps the path is open, the one of them that comes closest is
+        added: the boxes are wider than the vehicles, so it is for the checker to say that it fails.
     """
     tau = reference.t - reference.t[0]
     lower, upper = occupancy.at(reference.t)
@@ -214,7 +216,7 @@ def open_passings(
                 p = int(np.argmin(badness))
                 if closest is None or badness[p] < closest[0]:
                     closest = (float(badness[p]), p, profile, maneuver)
-    if not best and closest is not None:
+    if closest is not None and not best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD}:
         badness_, p, profile, maneuver = closest
         best[maneuver] = (1e3 + badness_, p, profile)
     passings = [

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.config import Config, LimitsConfig
+from repair.kinematics import POSITION_TOLERANCE
 from repair.occupancy import relevant
 from repair.passing import open_passings
 from repair.types import Array, Curve, LateralBounds, Limits, Maneuver, Occupancy, RepairProblem, frozen
@@ -24,7 +25,7 @@ __all__ = ["ProblemFactory", "resolve_limits"]
 _USABLE = 0.9
 
 
-def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float) -> Limits:
+def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: float) -> Limits:
     """Limits with the vehicle's own numbers where the configuration leaves them open.
 
     Parameters
@@ -32,10 +33,14 @@ def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float) -> Limi
     speed : float
         Initial speed [m/s]; beyond ``v_switch`` the engine limits acceleration (CommonRoad vehicle
         models, eq. 2), and the limit is taken a little above this speed.
+    dt : float
+        Time step [s]. The drivability checker drives a transition with constant acceleration and
+        allows 2 cm of error; a jerk j moves the end by j dt**3 / 12.
     """
     usable = _USABLE * vehicle.a_max
     engine = usable * min(1.0, vehicle.v_switch / max(speed + 3.0, 1e-3))
     slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(0.95 * vehicle.steering_max))
+    drivable = 0.6 * POSITION_TOLERANCE * 12.0 / dt**3
     a_total = usable if config.a_total is None else config.a_total
     return Limits(
         v_max=config.v_max if config.v_max is not None else vehicle.v_max,
@@ -44,7 +49,7 @@ def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float) -> Limi
         a_max=config.a_max if config.a_max is not None else engine,
         a_lat=config.a_lat if config.a_lat is not None else a_total,
         a_total=a_total,
-        j_lon=config.j_lon,
+        j_lon=min(config.j_lon, drivable),
         j_lat=config.j_lat,
         curvature=float(np.sin(slip) / vehicle.rear),
     )

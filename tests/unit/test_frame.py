@@ -52,7 +52,9 @@ def test_derivatives_against_finite_differences(frame: FrenetFrame) -> None:
     s, h = np.random.default_rng(1).uniform(1.0, frame.length - 1.0, 300), 1e-4
     step = (frame.position(s + h) - frame.position(s - h)) / (2 * h)
     np.testing.assert_allclose(np.arctan2(step[:, 1], step[:, 0]), frame.heading(s), atol=1e-7)
-    np.testing.assert_allclose((frame.heading(s + h) - frame.heading(s - h)) / (2 * h), frame.curvature(s), atol=1e-5)
+    np.testing.assert_allclose(
+        (frame.heading(s + h) - frame.heading(s - h)) / (2 * h), frame.curvature(s), atol=1e-5
+    )
     knot = np.abs(np.rint(s / frame.s[1]) * frame.s[1] - s) < 2 * h  # the rate jumps at knots
     rate = (frame.curvature(s + h) - frame.curvature(s - h)) / (2 * h)
     np.testing.assert_allclose(rate[~knot], frame.curvature_rate(s)[~knot], atol=1e-5)
@@ -99,7 +101,9 @@ def test_smoothing_stays_within_its_tolerance(seed: int) -> None:
     heading = np.cumsum(rng.uniform(-0.35, 0.35, 12))
     coarse = np.cumsum(6.0 * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
     made = FrenetFrame.from_points(coarse, smoothing=0.15)
-    assert np.nanmax(np.abs(made.to_frenet(coarse)[:, 1])) < 0.25  # the tolerance, and half a chord between samples
+    assert (
+        np.nanmax(np.abs(made.to_frenet(coarse)[:, 1])) < 0.25
+    )  # the tolerance, and half a chord between samples
     assert np.max(np.abs(made.curvature_table)) < 0.35 / 1.5
 
 

@@ -39,8 +39,9 @@ def crossings(frame: FrenetFrame, lanes: Mapping[int, Lane], *, spacing: float =
     import shapely
 
     s = np.linspace(0.0, frame.length, max(int(np.ceil(frame.length / spacing)), 1) + 1)
-    base = frame.position(s)
-    heading = frame.heading(s)
+    inside = np.clip(s, 0.05, frame.length - 0.05)  # at the very end a normal may lie on a lanelet's edge
+    base = frame.position(inside)
+    heading = frame.heading(inside)
     tangent = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
     # on the inner side of a curve the normals end where they would meet
@@ -48,7 +49,9 @@ def crossings(frame: FrenetFrame, lanes: Mapping[int, Lane], *, spacing: float =
     inner = 0.95 / np.maximum(np.abs(curvature), 0.95 / _REACH)
     left = np.where(curvature > 0, inner, _REACH)
     right = np.where(curvature < 0, inner, _REACH)
-    normals = shapely.linestrings(np.stack([base - right[:, None] * normal, base + left[:, None] * normal], axis=1))
+    normals = shapely.linestrings(
+        np.stack([base - right[:, None] * normal, base + left[:, None] * normal], axis=1)
+    )
     ids = [i for i, lane in lanes.items() if lane.drivable]
     polygons = np.array([lanes[i].polygon for i in ids])
     which, row = shapely.STRtree(normals).query(polygons, predicate="intersects")
@@ -120,5 +123,7 @@ def lateral_bounds(
         index = np.rint(nearest).astype(np.intp)
         right, left = right[index], left[index]
     return LateralBounds(
-        frozen(found.s), frozen(np.minimum(right + half_width, 0.0)), frozen(np.maximum(left - half_width, 0.0))
+        frozen(found.s),
+        frozen(np.minimum(right + half_width, 0.0)),
+        frozen(np.maximum(left - half_width, 0.0)),
     )

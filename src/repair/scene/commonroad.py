@@ -125,7 +125,7 @@ class Scene:
     @property
     def times(self) -> Array:
         """Times of the steps (n_steps + 1,) [s]."""
-        return np.arange(self.n_steps + 1) * self.dt
+        return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt
 
 
 def load_scene(
@@ -174,7 +174,11 @@ def load_scene(
     except ScenarioError as error:
         raise ScenarioError(f"{contents.path.name}: {error}") from error
     return replace(
-        scene, id=contents.benchmark_id, path=contents.path, sha256=contents.sha256, notes=(*note, *scene.notes)
+        scene,
+        id=contents.benchmark_id,
+        path=contents.path,
+        sha256=contents.sha256,
+        notes=(*note, *scene.notes),
     )
 
 
@@ -243,8 +247,9 @@ def _build(
         goal_s=_goal_s(frame, s0, route, lanes, problem.goal), route_end_s=frame.length,
         route_lanelets=route.lanelets, horizon=duration, n_steps=n_steps,
         obstacles=obstacles, recorded_ego=recorded,
-        lane=lateral_bounds(found, half, lanelets=route.lanelets),
-        same_direction=lateral_bounds(found, half, lanelets=route.lanelets, same_direction=True),
+        lane=lateral_bounds(found, half, lanelets=(*route.behind, *route.lanelets)),
+        same_direction=lateral_bounds(
+            found, half, lanelets=(*route.behind, *route.lanelets), same_direction=True),
         road=lateral_bounds(found, half),
         speed_limit=_speed_limit(scenario, frame, route, lanes, notes),
         notes=(*notes, *remarks), scenario=scenario, planning_problem=problem,
@@ -258,7 +263,7 @@ def _initial_state(state: Any) -> InitialState:
         raise ScenarioError("the planning problem's initial position is not an exact point")
     for name in ("orientation", "velocity", "acceleration", "yaw_rate"):
         value = getattr(state, name, None)
-        if hasattr(value, "start"):
+        if value is not None and hasattr(value, "start"):
             value = (value.start + value.end) / 2.0
         if value is None and name in ("orientation", "velocity"):
             raise ScenarioError(f"the planning problem's initial state has no {name}")
@@ -297,7 +302,7 @@ def _is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehic
     if state is None or hasattr(state.position, "center") or hasattr(state.position, "shapes"):
         return False
     heading, speed = getattr(state, "orientation", None), getattr(state, "velocity", None)
-    if hasattr(heading, "start") or hasattr(speed, "start"):
+    if hasattr(heading, "start") or hasattr(speed, "start"):  # uncertain
         return False
     off = np.hypot(state.position[0] - ego.x, state.position[1] - ego.y)
     turned = 0.0 if heading is None else abs((heading - ego.orientation + np.pi) % (2 * np.pi) - np.pi)
@@ -307,14 +312,20 @@ def _is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehic
     return bool(off < 0.5 and turned < 0.1 and faster < 1.0 and alike)
 
 
-def _goal_s(frame: FrenetFrame, s0: float, route: Route, lanes: Mapping[int, Lane], goal: Any) -> float | None:
+def _goal_s(
+    frame: FrenetFrame, s0: float, route: Route, lanes: Mapping[int, Lane], goal: Any
+) -> float | None:
     """Where the goal region begins along the path: never before the ego."""
     named = {i for ids in (goal.lanelets_of_goal_position or {}).values() for i in ids}
     entries: list[Array] = [lanes[i].center[:1] for i in route.goal_lanelets if i in named]
     if not named:
         shapes = [p for st in goal.state_list if st.has_value("position") for p in getattr(
             st.position, "shapes", [st.position])]  # fmt: skip
-        entries = [np.asarray(p.shapely_object.exterior.coords)[:, :2] for p in shapes if hasattr(p, "shapely_object")]
+        entries = [
+            np.asarray(p.shapely_object.exterior.coords)[:, :2]
+            for p in shapes
+            if hasattr(p, "shapely_object")
+        ]
     starts = []
     for points in entries:
         projected = frame.to_frenet(points)
@@ -350,5 +361,5 @@ def _speed_limit(
         entries.append((begin, np.inf if limit is None or not limit > 0.0 else float(limit)))
     if all(np.isinf(limit) for _, limit in entries):
         return None
-    s, speed = zip(*entries)
+    s, speed = zip(*entries, strict=True)
     return SpeedLimit(frozen(s), frozen(speed))

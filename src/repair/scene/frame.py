@@ -90,7 +90,7 @@ class FrenetFrame:
         ends[3, 1], ends[2, 1] = points[-1], spline(self.length, 1)
         # one straight segment before the first and one after the last: no branches when evaluating
         full = np.concatenate([ends[:, :1], cubic, ends[:, 1:]], axis=1)
-        self._coefficients = frozen(full.transpose(1, 0, 2))  # (count + 2, 4, 2)
+        self._coefficients = frozen(full.transpose(0, 2, 1))  # (4, 2, count + 2): long rows evaluate fast
         self._knots = frozen(np.concatenate([[0.0], self.s]))
         self._last = float(count + 1)
         velocity, second = spline(self.s, 1), spline(self.s, 2)
@@ -144,12 +144,10 @@ class FrenetFrame:
         return index, query - self._knots[index]
 
     def _derivatives(self, s: npt.ArrayLike, highest: int) -> tuple[list[Array], Any]:
-        """Position and derivatives by s up to ``highest``, each (..., 2), and the segment."""
-        index, offset = self._locate(s)
-        c = self._coefficients[index]
-        u = offset[..., None]
-        c3, c2, c1 = c[..., 0, :], c[..., 1, :], c[..., 2, :]
-        found = [((c3 * u + c2) * u + c1) * u + c[..., 3, :]]
+        """Position and derivatives by s up to ``highest``, each (2, ...), and the segment."""
+        index, u = self._locate(s)
+        c3, c2, c1, c0 = self._coefficients.take(index, axis=2)
+        found = [((c3 * u + c2) * u + c1) * u + c0]
         if highest >= 1:
             found.append((3.0 * c3 * u + 2.0 * c2) * u + c1)
         if highest >= 2:
@@ -160,12 +158,14 @@ class FrenetFrame:
 
     def position(self, s: npt.ArrayLike) -> Array:
         """Points of the path (..., 2) at ``s`` (...)."""
-        return self._derivatives(s, 0)[0][0]
+        return _pairs(*self._derivatives(s, 0)[0][0])
 
     def heading(self, s: npt.ArrayLike) -> Array:
         """Continuous heading [rad] at ``s``."""
-        (_, d1), index = self._derivatives(s, 1)
-        return self._continuous(np.arctan2(d1[..., 1], d1[..., 0]), index)
+        index, u = self._locate(s)
+        c3, c2, c1, _ = self._coefficients.take(index, axis=2)
+        x1, y1 = (3.0 * c3 * u + 2.0 * c2) * u + c1
+        return self._continuous(np.arctan2(y1, x1), index)
 
     def _continuous(self, angle: Array, index: Any) -> Array:
         turns = np.rint((self._turns[index] - angle) / (2.0 * np.pi))
@@ -173,26 +173,22 @@ class FrenetFrame:
 
     def curvature(self, s: npt.ArrayLike) -> Array:
         """Curvature [1/m] at ``s``, left positive."""
-        (_, d1, d2), _ = self._derivatives(s, 2)
-        x1, y1 = d1[..., 0], d1[..., 1]
+        (_, (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
         square = x1 * x1 + y1 * y1
-        return np.asarray((x1 * d2[..., 1] - y1 * d2[..., 0]) / (square * np.sqrt(square)))
+        return np.asarray((x1 * y2 - y1 * x2) / (square * np.sqrt(square)))
 
     def curvature_rate(self, s: npt.ArrayLike) -> Array:
         """Derivative of the curvature by s [1/m²] (piecewise continuous)."""
-        (_, d1, d2, d3), _ = self._derivatives(s, 3)
-        square = np.sum(d1 * d1, axis=-1)
-        cross = d1[..., 0] * d2[..., 1] - d1[..., 1] * d2[..., 0]
-        rate = d1[..., 0] * d3[..., 1] - d1[..., 1] * d3[..., 0]
-        dot = np.sum(d1 * d2, axis=-1)
-        return np.asarray((rate - 3.0 * cross * dot / square) / square**1.5)
+        (_, (x1, y1), (x2, y2), (x3, y3)), _ = self._derivatives(s, 3)
+        square = x1 * x1 + y1 * y1
+        cross, rate, dot = x1 * y2 - y1 * x2, x1 * y3 - y1 * x3, x1 * x2 + y1 * y2
+        return np.asarray((rate - 3.0 * cross * dot / square) / (square * np.sqrt(square)))
 
     def to_cartesian(self, s: npt.ArrayLike, l: npt.ArrayLike) -> Array:  # noqa: E741
         """Points (..., 2) at arc length ``s`` and offset ``l``."""
-        (point, d1), _ = self._derivatives(s, 1)
-        offset = np.asarray(l, dtype=np.float64) / np.sqrt(np.sum(d1 * d1, axis=-1))
-        normal = np.stack([-d1[..., 1], d1[..., 0]], axis=-1)
-        return np.asarray(point + offset[..., None] * normal)
+        ((x, y), (x1, y1)), _ = self._derivatives(s, 1)
+        offset = np.asarray(l, dtype=np.float64) / np.sqrt(x1 * x1 + y1 * y1)
+        return _pairs(x - offset * y1, y + offset * x1)
 
     # ------------------------------------------------------------------ projection
 
@@ -226,7 +222,9 @@ class FrenetFrame:
         if usable.any():
             hint = None
             if near is not None:
-                hint = np.broadcast_to(np.asarray(near, dtype=np.float64), query.shape[:-1]).reshape(-1)[usable]
+                hint = np.broadcast_to(np.asarray(near, dtype=np.float64), query.shape[:-1]).reshape(-1)[
+                    usable
+                ]
             result[usable] = self._project(flat[usable], hint)
         return result.reshape(query.shape)
 
@@ -243,22 +241,23 @@ class FrenetFrame:
 
     def _project(self, flat: Array, hint: Array | None) -> Array:
         start = self._nearest(flat, hint)
-        s = start.copy()
+        px, py = np.ascontiguousarray(flat.T)
+        s = start
         for _ in range(_NEWTON):
-            (point, d1, d2), _ = self._derivatives(s, 2)
-            gap = flat - point
-            residual = np.sum(gap * d1, axis=1)
-            slope = np.sum(gap * d2, axis=1) - np.sum(d1 * d1, axis=1)  # -(1 - kappa l)
-            step = residual / np.minimum(slope, -_DOMAIN)
+            ((x, y), (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
+            gx, gy = px - x, py - y
+            slope = gx * x2 + gy * y2 - x1 * x1 - y1 * y1  # -(1 - kappa l)
+            step = (gx * x1 + gy * y1) / np.minimum(slope, -_DOMAIN)
             s = s - step
             if np.max(np.abs(step)) < 1e-11:
                 break
-        (point, d1, d2), _ = self._derivatives(s, 2)
-        gap = flat - point
-        norm = np.sqrt(np.sum(d1 * d1, axis=1))
-        lateral = (d1[:, 0] * gap[:, 1] - d1[:, 1] * gap[:, 0]) / norm
-        along = np.abs(np.sum(gap * d1, axis=1)) / norm
-        width = 1.0 - (np.sum(gap * d2, axis=1)) / norm**2
+        ((x, y), (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
+        gx, gy = px - x, py - y
+        square = x1 * x1 + y1 * y1
+        norm = np.sqrt(square)
+        lateral = (x1 * gy - y1 * gx) / norm
+        along = np.abs(gx * x1 + gy * y1) / norm
+        width = 1.0 - (gx * x2 + gy * y2) / square
         # Newton may run away from the nearest sample only along the straight extensions
         strayed = (np.abs(np.clip(s, 0.0, self.length) - start) > 1.0) & (width < 0.5)
         outside = (width <= _DOMAIN) | (np.abs(lateral) > self.max_lateral) | (along > 1e-7) | strayed
@@ -271,21 +270,29 @@ class FrenetFrame:
     def cartesian(self, trajectory: FrenetTrajectory) -> CartesianPath:
         """Carry a Frenet trajectory into the plane; see :class:`CartesianPath`."""
         s, lateral = trajectory.position[:, 0], trajectory.position[:, 1]
-        (point, d1, d2), index = self._derivatives(s, 2)
-        norm = np.sqrt(np.sum(d1 * d1, axis=1))
-        unit = d1 / norm[:, None]
-        xy = point + lateral[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-        curvature = (unit[:, 0] * d2[:, 1] - unit[:, 1] * d2[:, 0]) / norm**2
+        ((x, y), (x1, y1), (x2, y2)), index = self._derivatives(s, 2)
+        square = x1 * x1 + y1 * y1
+        norm = np.sqrt(square)
+        xy = _pairs(x - lateral * y1 / norm, y + lateral * x1 / norm)
+        curvature = (x1 * y2 - y1 * x2) / (square * norm)
         forward = trajectory.velocity[:, 0] * (1.0 - curvature * lateral)
         sideways = trajectory.velocity[:, 1]
         sign = np.where(trajectory.velocity[:, 0] < 0.0, -1.0, 1.0)
         speed = sign * np.hypot(forward, sideways)
-        base = self._continuous(np.arctan2(unit[:, 1], unit[:, 0]), index)
+        base = self._continuous(np.arctan2(y1, x1), index)
         slip = np.arctan2(sign * sideways, sign * forward)
         heading = _held(base + slip, base, np.abs(speed) >= STANDSTILL)
         chords = np.hypot(*np.diff(xy, axis=0).T) if len(xy) > 1 else np.zeros(0)
         distance = np.concatenate([[0.0], np.cumsum(chords)]) if len(xy) else np.zeros(0)
         return CartesianPath(trajectory.t, xy, heading, speed, distance)
+
+
+def _pairs(x: Array, y: Array) -> Array:
+    """Two arrays (...) as one (..., 2)."""
+    made = np.empty((*np.shape(x), 2))
+    made[..., 0] = x
+    made[..., 1] = y
+    return made
 
 
 def _held(heading: Array, fallback: Array, moving: npt.NDArray[np.bool_]) -> Array:

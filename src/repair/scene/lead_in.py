@@ -36,7 +36,7 @@ def largest_curvature(vehicle: Vehicle) -> float:
 
 
 def _route_frame(center: Array, smoothing: float) -> tuple[FrenetFrame, float]:
-    """Frame along a centre line, smoothed harder only where its kinks ask for it; also the tolerance used [m]."""
+    """Frame along a centre line, smoothed harder only if its kinks ask for it; and the tolerance used [m]."""
     for tolerance in (smoothing, *(t for t in (0.25, 0.5, 1.0) if t > smoothing)):
         frame = FrenetFrame.from_points(center, smoothing=tolerance)
         if np.max(np.abs(frame.curvature_table)) <= _SHARP:
@@ -130,7 +130,13 @@ def _wrapped(angle: float) -> float:
 
 
 def drive_path(
-    center: Array, position: Array, orientation: float, speed: float, vehicle: Vehicle, *, smoothing: float = 0.15
+    center: Array,
+    position: Array,
+    orientation: float,
+    speed: float,
+    vehicle: Vehicle,
+    *,
+    smoothing: float = 0.15,
 ) -> LeadIn:
     """Lay the frame along the path from the ego's pose onto the centre line.
 
@@ -168,7 +174,9 @@ def drive_path(
     error = _wrapped(direction - float(frame.heading(s0)))
     turn = np.empty((0, 2))
     if abs(error) > _STEEP:
-        notes.append(f"the ego starts {np.rad2deg(error):.0f} degrees off its route and first turns towards it")
+        notes.append(
+            f"the ego starts {np.rad2deg(error):.0f} degrees off its route and first turns towards it"
+        )
         poses = _turn_in(frame, np.array([*position, direction]), limit)
         turn = poses[:-1, :2]
         curvature = (poses[-1, 2] - poses[-2, 2]) / 0.25

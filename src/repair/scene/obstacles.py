@@ -14,19 +14,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from repair.errors import ConfigError, ScenarioError
+from repair.scene.shapes import (
+    Placed,
+    enclosing,
+    interval,
+    occupied,
+    outlines,
+    place,
+    polygons_of,
+    subdivided,
+    union,
+)
 from repair.types import Array, frozen
 
 __all__ = ["AFTER_PREDICTION", "Obstacle", "last_predicted_step", "obstacles_of"]
 
 AFTER_PREDICTION = ("remove", "hold", "constant_velocity")
-
-_EDGE = 2.0  # outline points are at most this far apart [m]
-_CORNERS = 16  # of the polygon circumscribed about a circle
 
 
 @dataclass(frozen=True)
@@ -72,157 +80,13 @@ class Obstacle:
         return len(self.vertices) - 1
 
 
-class _Placed(NamedTuple):
-    """One occupancy: exactly one of the three is set; and the state behind it."""
-
-    rectangle: tuple[float, ...] | None
-    circle: tuple[float, ...] | None
-    polygons: tuple[Array, ...] | None
-    state: tuple[float, float, float, float]
-
-    def moved(self, shift: Array) -> _Placed:
-        dx, dy = float(shift[0]), float(shift[1])
-        return _Placed(
-            self.rectangle and (self.rectangle[0] + dx, self.rectangle[1] + dy, *self.rectangle[2:]),
-            self.circle and (self.circle[0] + dx, self.circle[1] + dy, self.circle[2]),
-            self.polygons and tuple(p + shift for p in self.polygons),
-            (self.state[0] + dx, self.state[1] + dy, *self.state[2:]),
-        )
-
-
-# ---------------------------------------------------------------------- shapes
-
-
-def _interval(value: Any) -> tuple[float, float]:
-    """Bounds of an exact or interval value."""
-    if hasattr(value, "start") and hasattr(value, "end"):
-        return float(value.start), float(value.end)
-    return float(value), float(value)
-
-
-def _box(center: Sequence[float], heading: float, half: Sequence[float]) -> Array:
-    c, s = np.cos(heading), np.sin(heading)
-    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], dtype=np.float64) * np.asarray(half)
-    return np.asarray(center, dtype=np.float64) + corners @ np.array([[c, s], [-s, c]])
-
-
-def _ring(center: Sequence[float], radius: float) -> Array:
-    angle = np.arange(_CORNERS) * 2.0 * np.pi / _CORNERS
-    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(center, dtype=np.float64) + around * radius / np.cos(np.pi / _CORNERS)
-
-
-def _convex_parts(vertices: Array) -> tuple[Array, ...]:
-    """Convex polygons (not closed, counter-clockwise) that make up a simple polygon."""
-    import shapely
-
-    outline = shapely.Polygon(vertices)
-    hull = outline.convex_hull
-    if not outline.is_valid:
-        outline = hull
-    if hull.area - outline.area <= 1e-6 * max(hull.area, 1e-9):
-        parts = [hull]
-    else:
-        parts = list(shapely.get_parts(shapely.constrained_delaunay_triangles(outline)))
-    rings = [np.asarray(shapely.get_coordinates(shapely.normalize(p)))[:-1][::-1] for p in parts if p.area > 0.0]
-    if not rings:  # a line or a point: give it a finger's width
-        rings = [np.asarray(shapely.get_coordinates(hull.buffer(0.01, quad_segs=2)))[:-1][::-1]]
-    return tuple(rings)
-
-
-def _parts(shape: Any) -> list[Any]:
-    """The primitive shapes of a shape."""
-    if hasattr(shape, "shapes"):
-        return [leaf for member in shape.shapes for leaf in _parts(member)]
-    return [shape]
-
-
-def _center_of(part: Any) -> Array:
-    """The point a primitive shape is turned about: its own centre, as commonroad-io does it."""
-    return np.asarray(part.center, dtype=np.float64)
-
-
-def _outlines(shape: Any, position: Array, heading: float) -> list[Array]:
-    """Convex outlines of a body shape placed exactly: turned about its own centre, then moved."""
-    c, s = np.cos(heading), np.sin(heading)
-    turn = np.array([[c, s], [-s, c]])
-    found: list[Array] = []
-    for part in _parts(shape):
-        center = _center_of(part)
-        if hasattr(part, "radius"):
-            found.append(_ring(center + position, float(part.radius)))
-        elif hasattr(part, "length"):
-            half = (part.length / 2.0, part.width / 2.0)
-            found.append(_box(center + position, heading + part.orientation, half))
-        else:
-            found.extend((p - center) @ turn + center + position for p in _convex_parts(np.asarray(part.vertices)))
-    return found
-
-
-def _place(shape: Any, position: Array, heading: float, speed: float) -> _Placed:
-    """A body shape at an exact pose."""
-    parts = _parts(shape)
-    state = (float(position[0]), float(position[1]), heading, speed)
-    part = parts[0]
-    if len(parts) == 1 and (hasattr(part, "radius") or hasattr(part, "length")):
-        center = _center_of(part) + position
-        if hasattr(part, "radius"):
-            return _Placed(None, (float(center[0]), float(center[1]), float(part.radius)), None, state)
-        half = (float(part.length) / 2.0, float(part.width) / 2.0)
-        where = (float(center[0]), float(center[1]), heading + float(part.orientation))
-        return _Placed((*where, *half), None, None, state)
-    return _Placed(None, None, tuple(_outlines(shape, position, heading)), state)
-
-
-def _enclosing(shape: Any, area: Any, low: float, high: float, speed: float) -> _Placed:
-    """Rectangle around every placement with the position in ``area`` and the heading in [low, high]."""
-    heading = (low + high) / 2.0
-    spread = min((high - low) / 2.0, np.pi)
-    body = np.concatenate(_outlines(shape, np.zeros(2), 0.0))
-    radius = np.hypot(body[:, 0], body[:, 1])
-    angle = np.arctan2(body[:, 1], body[:, 0])
-    # a corner sweeps an arc; its extreme along an axis is inside the arc or at one end
-    reach = []
-    for axis in (0.0, np.pi / 2, np.pi, -np.pi / 2):
-        off = np.abs((angle - axis + np.pi) % (2 * np.pi) - np.pi)
-        reach.append(float(np.max(radius * np.cos(np.maximum(off - spread, 0.0)))))
-    if hasattr(area, "center") or hasattr(area, "shapes"):
-        where = np.concatenate(_outlines(area, np.zeros(2), 0.0))
-    else:
-        where = np.asarray(area, dtype=np.float64)[None, :2]
-    c, s = np.cos(heading), np.sin(heading)
-    local = where @ np.array([[c, -s], [s, c]])
-    upper = np.max(local, axis=0) + reach[:2]
-    lower = np.min(local, axis=0) - reach[2:]
-    center = (upper + lower) / 2.0 @ np.array([[c, s], [-s, c]])
-    half = (upper - lower) / 2.0
-    middle = np.mean(where, axis=0)
-    return _Placed(
-        (float(center[0]), float(center[1]), heading, float(half[0]), float(half[1])),
-        None,
-        None,
-        (float(middle[0]), float(middle[1]), heading, speed),
-    )
-
-
-def _occupied(shape: Any) -> _Placed:
-    """An occupancy that is given in the plane."""
-    placed = _place(shape, np.zeros(2), 0.0, np.nan)
-    if placed.rectangle:
-        return placed._replace(state=(*placed.rectangle[:2], np.nan, np.nan))
-    if placed.circle:
-        return placed._replace(state=(*placed.circle[:2], np.nan, np.nan))
-    middle = np.mean(np.concatenate(placed.polygons or ()), axis=0)
-    return placed._replace(state=(float(middle[0]), float(middle[1]), np.nan, np.nan))
-
-
 # ---------------------------------------------------------------------- states over time
 
 
 def _position(state: Any) -> Array:
     position = state.position
     if hasattr(position, "center") or hasattr(position, "shapes"):
-        return np.mean(np.concatenate(_outlines(position, np.zeros(2), 0.0)), axis=0)
+        return np.asarray(np.mean(np.concatenate(outlines(position, np.zeros(2), 0.0)), axis=0))
     return np.asarray(position, dtype=np.float64)[:2]
 
 
@@ -237,7 +101,7 @@ def _headings(states: Sequence[Any]) -> list[tuple[float, float]]:
     """Heading interval of every state; a missing one is the direction of motion."""
     found = [_attribute(s, "orientation") for s in states]
     if all(h is not None for h in found):
-        return [_interval(h) for h in found]
+        return [interval(h) for h in found]
     where = np.array([_position(s) for s in states])
     step = np.gradient(where, axis=0) if len(where) > 1 else np.zeros_like(where)
     moving = np.hypot(step[:, 0], step[:, 1]) > 1e-3
@@ -245,32 +109,34 @@ def _headings(states: Sequence[Any]) -> list[tuple[float, float]]:
     if moving.any():
         last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
         motion = motion[np.where(last < 0, int(np.argmax(moving)), last)]
-    return [_interval(h) if h is not None else (float(m), float(m)) for h, m in zip(found, motion)]
+    return [
+        interval(h) if h is not None else (float(m), float(m)) for h, m in zip(found, motion, strict=True)
+    ]
 
 
-def _state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> _Placed:
-    speed = sum(_interval(_attribute(state, "velocity"))) / 2.0
+def _state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Placed:
+    speed = sum(interval(_attribute(state, "velocity"))) / 2.0
     lateral = getattr(state, "velocity_y", None)
     if lateral is not None:
-        speed = float(np.hypot(speed, sum(_interval(lateral)) / 2.0))
+        speed = float(np.hypot(speed, sum(interval(lateral)) / 2.0))
     position = state.position
     exact = not (hasattr(position, "center") or hasattr(position, "shapes"))
     if exact and heading[0] == heading[1]:
-        return _place(shape, np.asarray(position, dtype=np.float64)[:2], heading[0], speed)
-    return _enclosing(shape, position, heading[0], heading[1], speed)
+        return place(shape, np.asarray(position, dtype=np.float64)[:2], heading[0], speed)
+    return enclosing(shape, position, heading[0], heading[1], speed)
 
 
 def _steps(value: Any) -> tuple[int, int]:
-    low, high = _interval(value)
+    low, high = interval(value)
     return int(np.floor(low)), int(np.ceil(high))
 
 
-def _timeline(obstacle: Any) -> tuple[dict[int, _Placed], str]:
+def _timeline(obstacle: Any) -> tuple[dict[int, Placed], str]:
     """Occupancies by the scenario's own time steps, and the role."""
     prediction = getattr(obstacle, "prediction", None)
     initial = getattr(obstacle, "initial_state", None)
     trajectory = getattr(prediction, "trajectory", None)
-    placed: dict[int, _Placed] = {}
+    placed: dict[int, Placed] = {}
     states: dict[int, Any] = {}
     if initial is not None:
         states[_steps(initial.time_step)[0]] = initial
@@ -280,51 +146,34 @@ def _timeline(obstacle: Any) -> tuple[dict[int, _Placed], str]:
     if states:
         order = sorted(states)
         shape = obstacle.obstacle_shape
-        for step, heading in zip(order, _headings([states[k] for k in order])):
-            if getattr(states[step], "hitch_angle", None) is not None:  # a trailer: commonroad-io knows how it trails
-                item = _occupied(obstacle.occupancy_at_time(step).shape)
+        for step, heading in zip(order, _headings([states[k] for k in order]), strict=True):
+            if (
+                getattr(states[step], "hitch_angle", None) is not None
+            ):  # a trailer: commonroad-io knows how it trails
+                item = occupied(obstacle.occupancy_at_time(step).shape)
                 placed[step] = item._replace(state=_state_occupancy(shape, states[step], heading).state)
             else:
-                body = shape if trajectory is None or step == order[0] else prediction.shape
+                body = (
+                    shape if trajectory is None or step == order[0] else getattr(prediction, "shape", shape)
+                )
                 placed[step] = _state_occupancy(body, states[step], heading)
     if prediction is not None and trajectory is None:
         for occupancy in prediction.occupancy_set:
             low, high = _steps(occupancy.time_step)
-            item = _occupied(occupancy.shape)
+            item = occupied(occupancy.shape)
             for step in range(low, high + 1):
                 before = placed.get(step)
-                placed[step] = item if before is None else _union(before, item)
+                placed[step] = item if before is None else union(before, item)
         return placed, "phantom" if initial is None else "set_based"
     return placed, "dynamic"
-
-
-def _polygons(item: _Placed) -> tuple[Array, ...]:
-    if item.rectangle:
-        return (_box(item.rectangle[:2], item.rectangle[2], item.rectangle[3:]),)
-    if item.circle:
-        return (_ring(item.circle[:2], item.circle[2]),)
-    return item.polygons or ()
-
-
-def _union(first: _Placed, second: _Placed) -> _Placed:
-    if not (first.polygons or second.polygons) and first == second:
-        return first
-    return _Placed(None, None, _polygons(first) + _polygons(second), second.state)
-
-
-def _subdivided(corners: Array) -> Array:
-    step = np.roll(corners, -1, axis=0) - corners
-    count = np.maximum(np.ceil(np.hypot(step[:, 0], step[:, 1]) / _EDGE), 1).astype(int)
-    pieces = [c + np.arange(n)[:, None] / n * d for c, n, d in zip(corners, count, step)]
-    return np.concatenate(pieces)
 
 
 # ---------------------------------------------------------------------- arrays
 
 
 def _filled(
-    rows: list[_Placed | None], after: str, dt: float, *, before_last: _Placed | None = None
-) -> list[_Placed | None]:
+    rows: list[Placed | None], after: str, dt: float, *, before_last: Placed | None = None
+) -> list[Placed | None]:
     """Continue past the last known row."""
     known = [k for k, row in enumerate(rows) if row is not None]
     if after == "remove" or not known:
@@ -342,7 +191,30 @@ def _filled(
     return [row if k <= last else item.moved((k - last) * shift) for k, row in enumerate(rows)]
 
 
-def _arrays(name: int, kind: str, role: str, rows: Sequence[_Placed | None], static_rows: int = 0) -> Obstacle:
+def _rigid_outline(rectangles: Array) -> Array | None:
+    """Outlines of one rectangle on its way, all at once; None where its size changes."""
+    half = rectangles[np.isfinite(rectangles[:, 0]), 3:]
+    if np.ptp(half, axis=0).any():
+        return None
+    local = subdivided(np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half[0])
+    c, s = np.cos(rectangles[:, 2, None]), np.sin(rectangles[:, 2, None])
+    x = c * local[:, 0] - s * local[:, 1] + rectangles[:, 0, None]
+    y = s * local[:, 0] + c * local[:, 1] + rectangles[:, 1, None]
+    return np.stack([x, y], axis=-1)
+
+
+def _outline_rows(rows: Sequence[Placed | None]) -> Array:
+    """Outlines of whatever shape, padded with their last point to the same length."""
+    shells = [np.concatenate([subdivided(p) for p in polygons_of(row)]) if row else None for row in rows]
+    vertices = np.full((len(rows), max(len(o) for o in shells if o is not None), 2), np.nan)
+    for k, outline in enumerate(shells):
+        if outline is not None:
+            vertices[k, : len(outline)] = outline
+            vertices[k, len(outline) :] = outline[-1]
+    return vertices
+
+
+def _arrays(name: int, kind: str, role: str, rows: Sequence[Placed | None], static_rows: int = 0) -> Obstacle:
     """Stack rows into an obstacle; a single row is repeated ``static_rows`` times without copying."""
     present = [row for row in rows if row is not None]
     rectangles = circles = None
@@ -352,14 +224,10 @@ def _arrays(name: int, kind: str, role: str, rows: Sequence[_Placed | None], sta
     elif all(row.circle for row in present):
         circles = np.array([row.circle if row else (np.nan,) * 3 for row in rows], dtype=np.float64)
     else:
-        polygons = tuple(tuple(frozen(p) for p in _polygons(row)) if row else () for row in rows)
-    outlines = [np.concatenate([_subdivided(p) for p in _polygons(row)]) if row else None for row in rows]
-    width = max(len(o) for o in outlines if o is not None)
-    vertices = np.full((len(rows), width, 2), np.nan)
-    for k, outline in enumerate(outlines):
-        if outline is not None:
-            vertices[k, : len(outline)] = outline
-            vertices[k, len(outline) :] = outline[-1]
+        polygons = tuple(tuple(frozen(p) for p in polygons_of(row)) if row else () for row in rows)
+    vertices = _rigid_outline(rectangles) if rectangles is not None else None
+    if vertices is None:
+        vertices = _outline_rows(rows)
     states = np.array([row.state if row else (np.nan,) * 4 for row in rows], dtype=np.float64)
     made = Obstacle(
         name, kind, role, frozen(vertices), None if rectangles is None else frozen(rectangles),
@@ -369,20 +237,20 @@ def _arrays(name: int, kind: str, role: str, rows: Sequence[_Placed | None], sta
 
 
 def _repeated(obstacle: Obstacle, count: int) -> Obstacle:
-    def wide(array: Array | None) -> Array | None:
-        return None if array is None else np.broadcast_to(array[0], (count, *array.shape[1:]))
+    def wide(array: Array) -> Array:
+        return np.broadcast_to(array[0], (count, *array.shape[1:]))
 
     return replace(
         obstacle,
         vertices=wide(obstacle.vertices),
-        rectangles=wide(obstacle.rectangles),
-        circles=wide(obstacle.circles),
+        rectangles=None if obstacle.rectangles is None else wide(obstacle.rectangles),
+        circles=None if obstacle.circles is None else wide(obstacle.circles),
         polygons=obstacle.polygons * count,
         states=wide(obstacle.states),
     )
 
 
-def _checked(name: int, placed: Iterable[_Placed]) -> None:
+def _checked(name: int, placed: Iterable[Placed]) -> None:
     for item in placed:
         numbers = [*(item.rectangle or ()), *(item.circle or ()), *item.state[:2]]
         finite = np.isfinite(numbers).all() and all(np.isfinite(p).all() for p in item.polygons or ())
@@ -449,7 +317,9 @@ def obstacles_of(
         If an obstacle has a number that is not finite; the sentence names it.
     """
     if after_prediction not in AFTER_PREDICTION:
-        raise ConfigError(f"after_prediction is {after_prediction!r}; it can be {', '.join(AFTER_PREDICTION)}")
+        raise ConfigError(
+            f"after_prediction is {after_prediction!r}; it can be {', '.join(AFTER_PREDICTION)}"
+        )
     found: list[Obstacle] = []
     ego: Obstacle | None = None
     notes: list[str] = []
@@ -475,32 +345,40 @@ def obstacles_of(
         if role == "dynamic" and ego is None and is_ego(obstacle):
             ego = made
             notes.append(f"obstacle {name} is the ego's own recording and is left out")
-        elif role == "dynamic" and name == ego_id and abs(np.nan_to_num(made.states[0, 3], nan=1e9) - ego_speed) < 1.0:
-            notes.append(f"obstacle {name} has the planning problem's id and the ego's speed: a copy, left out")
+        elif (
+            role == "dynamic"
+            and name == ego_id
+            and abs(np.nan_to_num(made.states[0, 3], nan=1e9) - ego_speed) < 1.0
+        ):
+            notes.append(
+                f"obstacle {name} has the planning problem's id and the ego's speed: a copy, left out"
+            )
         else:
             found.append(made)
     return tuple(found), ego, notes
 
 
 def _continued(
-    rows: list[_Placed | None], timeline: dict[int, _Placed], first: int, after: str, dt: float
-) -> list[_Placed | None]:
+    rows: list[Placed | None], timeline: dict[int, Placed], first: int, after: str, dt: float
+) -> list[Placed | None]:
     if after == "remove" or not timeline:
         return rows
     last = max(timeline)
     if last < first:  # the prediction ended before the start
         item = timeline[last]
-        moved = _filled([item] + [None] * (first - last + len(rows) - 1), after, dt, before_last=timeline.get(last - 1))
+        moved = _filled(
+            [item] + [None] * (first - last + len(rows) - 1), after, dt, before_last=timeline.get(last - 1)
+        )
         return moved[first - last :]
     return _filled(rows, after, dt, before_last=timeline.get(first - 1))
 
 
-def _standing(obstacle: Any) -> tuple[str, _Placed] | None:
+def _standing(obstacle: Any) -> tuple[str, Placed] | None:
     """Role and place of an obstacle that never moves; None for the others."""
     role = str(getattr(obstacle.obstacle_role, "value", obstacle.obstacle_role))
     if getattr(obstacle, "initial_state", None) is None:
         shape = getattr(obstacle, "obstacle_shape", None)
-        return None if shape is None else ("environment", _occupied(shape))
+        return None if shape is None else ("environment", occupied(shape))
     if role != "static" and getattr(obstacle, "prediction", None) is not None:
         return None
     state = obstacle.initial_state

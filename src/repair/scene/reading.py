@@ -98,7 +98,9 @@ def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
             scenario, problems = CommonRoadFileReader(data, FileFormat.XML).open()
     except Exception as error:  # commonroad-io raises whatever the broken part happens to cause
         cause = " ".join(str(error).split())[:200] or "no further explanation"
-        raise ScenarioError(f"{path.name}: commonroad-io cannot read it ({type(error).__name__}: {cause})") from error
+        raise ScenarioError(
+            f"{path.name}: commonroad-io cannot read it ({type(error).__name__}: {cause})"
+        ) from error
     return FileContents(
         path=path,
         benchmark_id=attributes.get("benchmarkID") or path.stem,
@@ -114,4 +116,6 @@ def _check_time_step(text: str | None, name: str) -> None:
     except ValueError:
         positive = False
     if not positive:
-        raise ScenarioError(f"{name}: the time step (timeStepSize) is {text!r}; it has to be a positive number")
+        raise ScenarioError(
+            f"{name}: the time step (timeStepSize) is {text!r}; it has to be a positive number"
+        )

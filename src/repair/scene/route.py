@@ -18,6 +18,7 @@ _HEADING_MAX = np.deg2rad(100.0)
 _HEADING_SPREAD = np.deg2rad(45.0)  # worse matches are considered only where no better one is
 _CHANGE_COST = 50.0  # a lane change weighs as much as this much road [m]
 _BEHIND = 45.0  # centre line behind the ego [m]
+_FAR = 450.0  # centre line ahead of the ego at most [m]
 _NOT_FOR_CARS = frozenset({"sidewalk", "bicycleLane", "crosswalk", "busStop", "border"})
 
 
@@ -49,6 +50,8 @@ class Route:
     ----------
     lanelets : tuple of int
         In driving order, from the ego's lanelet on (the one it leaves by a lane change included).
+    behind : tuple of int
+        Those before, as far as the centre line reaches back.
     center : (M, 2) array
         The centre line [m], from about 45 m behind the ego to the end of the route.
     goal_lanelets : tuple of int
@@ -59,6 +62,7 @@ class Route:
     """
 
     lanelets: tuple[int, ...]
+    behind: tuple[int, ...]
     center: Array
     goal_lanelets: tuple[int, ...]
     road_ends: bool
@@ -181,8 +185,8 @@ def _starts(lanes: Mapping[int, Lane], position: Array, heading: float) -> list[
     reach = 0.05 if np.any(distance <= 0.05) else _NEAR
     if not np.any(distance <= reach):
         raise ScenarioError(
-            f"the ego starts at ({position[0]:.1f}, {position[1]:.1f}), {np.min(distance):.1f} m from the nearest "
-            f"lanelet; at most {_NEAR:g} m are bridged"
+            f"the ego starts at ({position[0]:.1f}, {position[1]:.1f}), {np.min(distance):.1f} m "
+            f"from the nearest lanelet; at most {_NEAR:g} m are bridged"
         )
     found = []
     for i in np.flatnonzero(distance <= reach):
@@ -215,7 +219,10 @@ def _search(
             reached = [g for g in group if g in distance]
             if reached:
                 nearest = min(reached, key=lambda g: (distance[g], g))
-                changes = sum(b not in lanes[a].successors for a, b in zip(paths[nearest], paths[nearest][1:]))
+                changes = sum(
+                    b not in lanes[a].successors
+                    for a, b in zip(paths[nearest], paths[nearest][1:], strict=False)
+                )
                 options.append((cost + 0.1 * changes, distance[nearest], paths[nearest]))
         if options:
             return list(min(options)[2]), group
@@ -239,7 +246,9 @@ def _change_early(path: list[int], lanes: Mapping[int, Lane]) -> list[int]:
     return path
 
 
-def _straightest(lanes: Mapping[int, Lane], here: Lane, options: Iterable[int], *, back: bool = False) -> int | None:
+def _straightest(
+    lanes: Mapping[int, Lane], here: Lane, options: Iterable[int], *, back: bool = False
+) -> int | None:
     """The continuation that turns least within its first 20 m (before: its last)."""
     sign = -1.0 if back else 1.0
     line = here.center[::-1] if back else here.center
@@ -251,10 +260,38 @@ def _straightest(lanes: Mapping[int, Lane], here: Lane, options: Iterable[int], 
         other = lanes[name].center[::-1] if back else lanes[name].center
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(other, axis=0).T))])
         index = int(np.clip(np.searchsorted(chord, 20.0), 1, len(other) - 1))
-        turn = abs(float(wrap(_direction(other, index, sign) - direction))) + (0.0 if lanes[name].drivable else 10.0)
+        turn = abs(float(wrap(_direction(other, index, sign) - direction))) + (
+            0.0 if lanes[name].drivable else 10.0
+        )
         if turn < least:
             best, least = name, turn
     return best
+
+
+def _straight_start(
+    lanes: Mapping[int, Lane], starts: Sequence[tuple[float, int]], position: Array, heading: float
+) -> int:
+    """Of the start lanelets that fit about equally well, the one that turns least within 20 m.
+
+    Where roads fork, the branches overlap at the ego's place and all have its heading there.
+    """
+    near = [name for cost, name in starts if cost <= starts[0][0] + 0.15]
+
+    def turn(name: int) -> float:
+        arc, _, _ = locate(lanes[name].center, position)
+        line, total, last = lanes[name].center, lanes[name].length - arc, name
+        while total < 20.0:
+            following = _straightest(lanes, lanes[last], lanes[last].successors)
+            if following is None:
+                break
+            line, last = lanes[following].center, following
+            total += lanes[following].length
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        wanted = chord[-1] - max(total - 20.0, 0.0)
+        index = int(np.clip(np.searchsorted(chord, wanted), 1, len(line) - 1))
+        return abs(float(wrap(_direction(line, index, 1.0) - heading)))
+
+    return min(near, key=turn)
 
 
 def _direction(line: Array, end: int, sign: float) -> float:
@@ -308,6 +345,17 @@ def _center_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float)
     return np.array(line)
 
 
+def _cut(line: Array, position: Array) -> tuple[Array, bool]:
+    """The part of a centre line around the ego, and whether its far end was cut off."""
+    chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    here = locate(line, position)[0]
+    low, high = max(here - 2.0 * _BEHIND, 0.0), min(here + _FAR, float(chord[-1]))
+    inside = (chord > low) & (chord < high)
+    arc = np.concatenate([[low], chord[inside], [high]])
+    part = np.stack([np.interp(arc, chord, line[:, 0]), np.interp(arc, chord, line[:, 1])], axis=1)
+    return part, high < chord[-1]
+
+
 def plan_route(
     lanes: Mapping[int, Lane],
     position: Array,
@@ -336,15 +384,19 @@ def plan_route(
     if found is not None:
         path, targets = _change_early(found[0], lanes), found[1]
     else:
-        path, targets = [starts[0][1]], set()
+        path, targets = [_straight_start(lanes, starts, position, heading)], set()
         if groups:
             notes.append(f"the goal cannot be reached from lanelet {path[0]}: the route goes straight on")
     if lanes[path[0]].polygon.distance(_point(position)) > 0.05:
-        notes.append(f"the ego starts outside of every lanelet; the nearest that fits its heading is {path[0]}")
+        notes.append(
+            f"the ego starts outside of every lanelet; the nearest that fits its heading is {path[0]}"
+        )
     first = 0
     while first + 1 < len(path) and path[first + 1] not in lanes[path[first]].successors:
         first += 1
-    changes = first + sum(b not in lanes[a].successors for a, b in zip(path[first:], path[first + 1 :]))
+    changes = first + sum(
+        b not in lanes[a].successors for a, b in zip(path[first:], path[first + 1 :], strict=False)
+    )
     if changes:
         notes.append(f"the route to the goal needs {changes} lane change{'s' if changes > 1 else ''}")
 
@@ -370,7 +422,10 @@ def plan_route(
         behind.insert(0, previous)
         room += lanes[previous].length
     center = _center_line(behind + path[first:], lanes, float(np.clip(4.0 * speed, 20.0, 80.0)))
-    return Route(tuple(path), frozen(center), tuple(i for i in path if i in targets), road_ends, tuple(notes))
+    center, cut = _cut(center, position)
+    road_ends = road_ends and not cut
+    reached = tuple(i for i in path if i in targets)
+    return Route(tuple(path), tuple(behind), frozen(center), reached, road_ends, tuple(notes))
 
 
 def _point(position: Array) -> Any:

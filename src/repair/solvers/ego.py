@@ -134,6 +134,12 @@ def _closest(pairs: Pairs, points: Array) -> float:
     return float(pairs.distance(points).min()) if pairs.row.size else float("inf")
 
 
+def _bend_speed(problem: RepairProblem, points: Array) -> Array:
+    """Speed (n - 1,) at which the bends along the control points use 0.8 of the lateral limit."""
+    bend = np.abs(problem.curvature_at(points[:, 0]))
+    return np.sqrt(0.8 * problem.limits.a_lat / np.maximum(np.maximum(bend[1:], bend[:-1]), 1e-9))
+
+
 def _standing(points: Array, degree: int) -> Array:
     """Stand instead of rolling back: what is left of a reversing motion becomes a standstill.
 
@@ -196,8 +202,7 @@ class EgoBackend:
         initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, self.spacing)
         built = time.perf_counter()
         try:
-            feasibility = self._bounds(problem, initial)
-            deformed, pairs, rounds = self._deform(problem, initial, feasibility, deadline)
+            deformed, pairs, feasibility, rounds = self._deform(problem, initial, deadline)
             refined = self._refine(problem, initial, deformed, feasibility, deadline)
             if self.config.guard and _closest(pairs, refined.points) < min(0.0, _closest(pairs, deformed.points)):
                 refined = deformed
@@ -227,24 +232,29 @@ class EgoBackend:
     # -- deformation -----------------------------------------------------------------------------
 
     def _deform(
-        self, problem: RepairProblem, initial: UniformBSpline, feasibility: tuple[Feasibility, Feasibility],
-        deadline: float | None,
-    ) -> tuple[_Minimum, Pairs, int]:
+        self, problem: RepairProblem, initial: UniformBSpline, deadline: float | None
+    ) -> tuple[_Minimum, Pairs, tuple[Feasibility, Feasibility], int]:
         """Minimise J; while control points still collide, double lambda_c and start again."""
         config = self.config
         collision = config.deform.collision
         shape = self._led_points(problem, initial)
         points = initial.points
+        led = shape
         for round_ in range(config.rebounds + 1):
+            feasibility, cap = self._bounds(problem, led)
             pairs = anchor_pairs(problem, initial.greville, shape, self.degree)
             minimum = self._minimise_deformation(
                 problem, initial, points, pairs, collision, feasibility[0], deadline
             )
-            if _closest(pairs, minimum.points) >= 0.0:
+            led = points = minimum.points
+            clear = _closest(pairs, points) >= 0.0
+            # The speed limit of a bend was taken where the guide is; see whether it holds here.
+            slow = (np.diff(points[:, 0]) / self.spacing <= 1.02 * _bend_speed(problem, points)).all()
+            if clear and (slow or cap is None):
                 break
-            collision *= 2.0
-            points = minimum.points
-        return minimum, pairs, round_ + 1
+            if not clear:
+                collision *= 2.0
+        return minimum, pairs, feasibility, round_ + 1
 
     def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
         """Where the guide leads the control points (the reference where there is no guide)."""
@@ -281,19 +291,21 @@ class EgoBackend:
         y, value, iterations, converged = self._lbfgs(cost, y0)
         return _Minimum(cost.points(y), value, iterations, converged)
 
-    def _bounds(self, problem: RepairProblem, initial: UniformBSpline) -> tuple[Feasibility, Feasibility]:
-        """Bounds of both stages; in a bend the speed is bound by the lateral acceleration."""
-        c, n = self.config, len(initial.points)
+    def _bounds(
+        self, problem: RepairProblem, led: Array
+    ) -> tuple[tuple[Feasibility, Feasibility], Array | None]:
+        """Bounds of both stages, and the speeds (n - 1,) that a bend allows where it matters."""
+        c, n = self.config, len(led)
         key = (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
-        both = [_feasibility(n, problem.limits, key, scale) for scale in (c.deform.feasible, c.refine.feasible)]
-        led = self._led_points(problem, initial)[:-1, 0]
-        bend = np.abs(problem.curvature_at(led))
-        cap = np.sqrt(0.9 * problem.limits.a_lat / np.maximum(bend, 1e-9))
+        deform, refine = (
+            _feasibility(n, problem.limits, key, scale) for scale in (c.deform.feasible, c.refine.feasible)
+        )
+        cap = _bend_speed(problem, led)
         if (cap >= c.elastic * problem.limits.v_max).all():
-            return both[0], both[1]
-        upper = both[0].upper.copy()
+            return (deform, refine), None
+        upper = deform.upper.copy()
         upper[: n - 1, 0] = np.minimum(upper[: n - 1, 0], cap)
-        return replace(both[0], upper=upper), replace(both[1], upper=upper)
+        return (replace(deform, upper=upper), replace(refine, upper=upper)), cap
 
     def _lbfgs(self, cost: _Cost, y0: Array) -> tuple[Array, float, int, bool]:
         from scipy.optimize import fmin_l_bfgs_b

@@ -1,0 +1,189 @@
+"""Piecewise Bernstein polynomials over time: evaluation, and the linear algebra of their QPs.
+
+A piece of degree n and duration h has control points Q_0 .. Q_n at the times k h / n of the piece
+(its Greville abscissae). The piece lies in their hull, a linear function of time has its own values
+as control points, and the k-th derivative has the control points n! / (n - k)! Delta^k Q / h^k
+(Farouki, *The Bernstein polynomial basis: a centennial retrospective*, 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import comb, factorial
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.types import Array, FrenetTrajectory, frozen
+
+__all__ = ["BernsteinCurve", "QpStructure", "bernstein_basis", "qp_structure"]
+
+
+def bernstein_basis(u: npt.ArrayLike, degree: int) -> Array:
+    """Values (K, degree + 1) of the basis polynomials at ``u`` (K,) in [0, 1]."""
+    x = np.asarray(u, dtype=np.float64)[:, None]
+    k = np.arange(degree + 1)
+    binomial = np.array([comb(degree, i) for i in range(degree + 1)], dtype=np.float64)
+    return np.asarray(binomial * x**k * (1.0 - x) ** (degree - k))
+
+
+@dataclass(frozen=True)
+class BernsteinCurve:
+    """A chain of Bernstein pieces of equal duration; implements :class:`repair.types.Curve`.
+
+    Attributes
+    ----------
+    t_start : float
+        Start of the first piece [s].
+    duration : float
+        Duration of each piece [s].
+    points : (M, n + 1, 2) array
+        Control points ``[s, l]`` [m] of the M pieces.
+    """
+
+    t_start: float
+    duration: float
+    points: Array
+
+    @property
+    def degree(self) -> int:
+        """Degree n of the pieces."""
+        return self.points.shape[1] - 1
+
+    @property
+    def t_end(self) -> float:
+        """End of the last piece [s]."""
+        return self.t_start + len(self.points) * self.duration
+
+    def derivative_points(self, order: int) -> Array:
+        """Control points (M, n + 1 - order, 2) of a derivative; their hull bounds it."""
+        scale = factorial(self.degree) / factorial(self.degree - order) / self.duration**order
+        return np.asarray(scale * np.diff(self.points, n=order, axis=1))
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate position and three derivatives; beyond the span the end speed is held."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        tau = np.clip(times - self.t_start, 0.0, self.t_end - self.t_start)
+        piece = np.clip(np.floor(tau / self.duration + 1e-9), 0, len(self.points) - 1).astype(np.intp)
+        u = np.clip(tau / self.duration - piece, 0.0, 1.0)
+        columns = [
+            np.einsum("kn,knd->kd", bernstein_basis(u, self.degree - k), self.derivative_points(k)[piece])
+            for k in range(4)
+        ]
+        beyond = times - self.t_start - tau
+        out = np.abs(beyond) > 1e-9
+        columns[0][out] += beyond[out, None] * columns[1][out]
+        columns[2][out] = 0.0
+        columns[3][out] = 0.0
+        return FrenetTrajectory(times, *columns)
+
+
+@dataclass(frozen=True)
+class QpStructure:
+    """All of a one-axis QP that depends on neither start, corridor nor limits.
+
+    With x (N,) the control points of all pieces one after the other, the start state and the
+    smoothness of the joints are met by construction: ``x = lift @ start + basis @ z`` with z free,
+    and the Hessian of the objective over z is the identity.
+
+    Attributes
+    ----------
+    pieces, degree, continuity : int
+    duration : float
+        Duration of a piece [s].
+    times : (N,) array
+        Time of every control point since the start [s].
+    lift : (N, 3) array
+        Control points for a start position, speed and acceleration, with z = 0.
+    basis : (N, m) array
+        Directions that keep start and joints.
+    derivatives : tuple of (R_k, N) arrays
+        Control points of position (k = 0) to jerk (k = 3).
+    reach : tuple of (R_k, m) arrays
+        ``derivatives[k] @ basis``.
+    nodes : (K,) array
+        Times of the quadrature since the start [s].
+    at_nodes : (K, N) array
+        Values of the curve at the nodes.
+    weights : (K,) array
+        Quadrature weights [s]; exact for the square of a piece.
+    hessian : (N, N) array
+        Of the objective over x.
+    joints : (J, N) array
+        Jump of position and derivatives at the joints.
+    """
+
+    pieces: int
+    degree: int
+    continuity: int
+    duration: float
+    times: Array
+    lift: Array
+    basis: Array
+    derivatives: tuple[Array, ...]
+    reach: tuple[Array, ...]
+    nodes: Array
+    at_nodes: Array
+    weights: Array
+    hessian: Array
+    joints: Array
+
+
+def _derivative(pieces: int, degree: int, duration: float, order: int) -> Array:
+    """Block-diagonal map from control points to those of the ``order``-th derivative."""
+    scale = factorial(degree) / factorial(degree - order) / duration**order
+    return np.kron(np.eye(pieces), scale * np.diff(np.eye(degree + 1), n=order, axis=0))
+
+
+def _joints(pieces: int, degree: int, continuity: int) -> Array:
+    """Jumps at the joints, ((pieces - 1) (continuity + 1), N); differences stand for derivatives."""
+    width = degree + 1
+    rows = np.zeros(((pieces - 1) * (continuity + 1), pieces * width))
+    for order in range(continuity + 1):
+        difference = np.diff(np.eye(width), n=order, axis=0)
+        for joint in range(pieces - 1):
+            row = rows[joint * (continuity + 1) + order]
+            row[joint * width : (joint + 1) * width] = difference[-1]
+            row[(joint + 1) * width : (joint + 2) * width] -= difference[0]
+    return rows
+
+
+@lru_cache(maxsize=64)
+def qp_structure(
+    pieces: int, degree: int, duration: float, continuity: int, w_jerk: float, w_deviation: float
+) -> QpStructure:
+    """Structure for one axis, objective ``w_jerk * int(jerk**2) + w_deviation * int((x - ref)**2)``."""
+    width = degree + 1
+    derivatives = tuple(_derivative(pieces, degree, duration, k) for k in range(4))
+    start = np.vstack([derivatives[k][:1] for k in range(3)])
+    joints = _joints(pieces, degree, continuity)
+    fixed = np.vstack([start, joints])
+    lift = np.linalg.pinv(fixed)[:, :3]
+    null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
+
+    nodes, node_weights = np.polynomial.legendre.leggauss(width)
+    u = 0.5 * (nodes + 1.0)
+    weights = np.tile(0.5 * duration * node_weights, pieces)
+    at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
+    jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
+    hessian = 2.0 * (w_jerk * jerk.T @ (weights[:, None] * jerk) + w_deviation * at_nodes.T @ (weights[:, None] * at_nodes))
+    factor = np.linalg.cholesky(null.T @ hessian @ null)
+    basis = np.linalg.solve(factor, null.T).T
+    piece = np.arange(pieces)[:, None]
+    return QpStructure(
+        pieces,
+        degree,
+        continuity,
+        duration,
+        frozen((duration * (piece + np.arange(width) / degree)).ravel()),
+        frozen(lift),
+        frozen(basis),
+        tuple(frozen(d) for d in derivatives),
+        tuple(frozen(d @ basis) for d in derivatives),
+        frozen((duration * (piece + u)).ravel()),
+        frozen(at_nodes),
+        frozen(weights),
+        frozen(hessian),
+        frozen(joints),
+    )

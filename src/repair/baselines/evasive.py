@@ -1,0 +1,303 @@
+"""TTR from fixed evasive manoeuvres: the latest moment at which full braking, kick-down or steering helps.
+
+TTB, TTK and TTS (Hillenbrand et al., *A multilevel collision mitigation approach*, T-ITS 2006; the
+names and the conventions of :attr:`EvasiveResult.ttr` and its parts are those of CommonRoad-CriMe:
+-inf where no such manoeuvre helps, inf without a conflict). Every manoeuvre is a trajectory along the
+reference's own path, on a point mass or within the steering limits of a kinematic single-track model;
+it stands when it has come to a stop, where a simulation at constant acceleration would reverse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.checker import SplicedCurve
+from repair.config import EvasiveConfig
+from repair.occupancy import first_entry
+from repair.types import Array, Curve, FrenetTrajectory, frozen
+
+if TYPE_CHECKING:
+    from repair.api import Prepared
+    from repair.scene.vehicle import Vehicle
+
+__all__ = ["EvasiveCurve", "EvasiveManeuver", "EvasiveResult", "EvasiveStatus", "evasive_ttr", "maneuvers_at"]
+
+_ENGINE_STEP = 0.25  # above v_switch the engine's power limit is followed in steps of this length [s]
+
+
+class EvasiveManeuver(str, Enum):
+    """The fixed manoeuvres."""
+
+    BRAKE = "brake"
+    KICK_DOWN = "kick_down"
+    STEER_LEFT = "steer_left"
+    STEER_RIGHT = "steer_right"
+
+
+class EvasiveStatus(str, Enum):
+    """Why a Time-To-X has its value."""
+
+    FOUND = "found"
+    NO_CONFLICT = "no_conflict"
+    NEVER = "never"
+    ALREADY_COLLIDING = "already_colliding"
+
+    @property
+    def value_without(self) -> float:
+        """The value [s] that stands for the status where it is not ``found``."""
+        return float("inf") if self is EvasiveStatus.NO_CONFLICT else -float("inf")
+
+
+@dataclass(frozen=True)
+class EvasiveCurve:
+    """A fixed manoeuvre relative to the reference's path; implements :class:`repair.types.Curve`.
+
+    Along the path the acceleration is piecewise constant, sideways the jerk; the lateral motion is
+    added to the path's own offset at the same s. Beyond its span the end speed is held.
+
+    Attributes
+    ----------
+    t_start, t_end : float
+        Span [s].
+    along : (P, 4) array
+        Time since ``t_start`` [s], s, speed and acceleration at the start of each phase.
+    across : (Q, 5) array
+        Time since ``t_start``, offset from the path, its rate, acceleration and jerk.
+    path_s, path_l : (M,) array
+        The reference's path, s increasing [m].
+    """
+
+    t_start: float
+    t_end: float
+    along: Array
+    across: Array
+    path_s: Array
+    path_l: Array
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate position and three derivatives."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        since = np.maximum(times - self.t_start, 0.0)
+        t0, s0, v0, a0 = self.along[np.searchsorted(self.along[1:, 0], since + 1e-12, side="right")].T
+        tau = since - t0
+        s, v = s0 + v0 * tau + 0.5 * a0 * tau**2, v0 + a0 * tau
+        t0, l0, r0, b0, j0 = self.across[np.searchsorted(self.across[1:, 0], since + 1e-12, side="right")].T
+        tau = since - t0
+        offset = l0 + r0 * tau + 0.5 * b0 * tau**2 + j0 * tau**3 / 6.0
+        rate, bend = r0 + b0 * tau + 0.5 * j0 * tau**2, b0 + j0 * tau
+        slope = np.gradient(self.path_l, self.path_s) if len(self.path_s) > 1 else np.zeros(1)
+        tilt = np.interp(s, self.path_s, slope)
+        return FrenetTrajectory(
+            times,
+            np.column_stack([s, np.interp(s, self.path_s, self.path_l) + offset]),
+            np.column_stack([v, tilt * v + rate]),
+            np.column_stack([a0, tilt * a0 + bend]),
+            np.column_stack([np.zeros_like(s), j0]),
+        )
+
+
+@dataclass(frozen=True)
+class EvasiveResult:
+    """Times by CommonRoad-CriMe's conventions [s]: -inf for "no such manoeuvre", inf for "no conflict".
+
+    Attributes
+    ----------
+    ttb, ttk, tts_left, tts_right : float
+        Latest start of full braking, kick-down, and steering to either side.
+    ttr : float
+        The latest of them.
+    maneuver : EvasiveManeuver or None
+        Which one that is.
+    status : dict
+        Why each of the four has its value.
+    curves : dict
+        The manoeuvre from its Time-To-X on, for those that exist.
+    """
+
+    ttb: float
+    ttk: float
+    tts_left: float
+    tts_right: float
+    ttr: float
+    maneuver: EvasiveManeuver | None
+    status: dict[EvasiveManeuver, EvasiveStatus]
+    curves: dict[EvasiveManeuver, EvasiveCurve] = field(default_factory=dict)
+
+    @property
+    def tts(self) -> float:
+        """The later of steering left and right [s]."""
+        return max(self.tts_left, self.tts_right)
+
+    @property
+    def curve(self) -> EvasiveCurve | None:
+        """The manoeuvre behind ``ttr``."""
+        return None if self.maneuver is None else self.curves.get(self.maneuver)
+
+
+def evasive_ttr(prepared: Prepared, settings: EvasiveConfig | None = None) -> EvasiveResult:
+    """TTB, TTK, TTS and TTR of a prepared scene's reference.
+
+    Parameters
+    ----------
+    prepared : repair.api.Prepared
+    settings : EvasiveConfig, optional
+        By default those of the prepared scene's configuration.
+
+    Returns
+    -------
+    EvasiveResult
+        Each time is the last scenario step before the TTC from which the manoeuvre avoids every
+        collision until the end of the repairs (``prepared.t_end``).
+    """
+    settings = settings or prepared.config.evasive
+    ttc = prepared.conflict.time
+    if ttc == float("inf"):
+        return _uniform(EvasiveStatus.NO_CONFLICT)
+    if prepared.conflict.contact_time <= 0.0:
+        return _uniform(EvasiveStatus.ALREADY_COLLIDING)
+    latest = max(int(np.ceil(ttc / prepared.scene.dt - 1e-6)) - 1, 0)
+    times: dict[EvasiveManeuver, float] = {}
+    curves: dict[EvasiveManeuver, EvasiveCurve] = {}
+    for maneuver in EvasiveManeuver:
+        times[maneuver] = -float("inf")
+        for step in range(latest, -1, -1):
+            curve = _escape(prepared, settings, maneuver, step * prepared.scene.dt)
+            if curve is not None:
+                times[maneuver], curves[maneuver] = curve.t_start, curve
+                break
+    status = {m: EvasiveStatus.FOUND if m in curves else EvasiveStatus.NEVER for m in EvasiveManeuver}
+    best = max(curves, key=lambda m: times[m], default=None)
+    brake, kick, left, right = (times[m] for m in EvasiveManeuver)
+    return EvasiveResult(brake, kick, left, right, max(times.values()), best, status, curves)
+
+
+def _uniform(status: EvasiveStatus) -> EvasiveResult:
+    value = status.value_without
+    return EvasiveResult(value, value, value, value, value, None, dict.fromkeys(EvasiveManeuver, status))
+
+
+def _escape(prepared: Prepared, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float) -> EvasiveCurve | None:
+    """The first variant of a manoeuvre from ``t`` on that is free until the end of the repairs."""
+    steering = maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT)
+    road = steering or prepared.conflict.kind == "off_road"
+    for curve in maneuvers_at(prepared.reference, t, prepared.t_end, maneuver, settings, prepared.scene.vehicle):
+        if _is_free(prepared, curve, settings.collision, road):
+            return curve
+    return None
+
+
+def _is_free(prepared: Prepared, curve: EvasiveCurve, collision: str, road: bool) -> bool:
+    checker = prepared.checker
+    driven = SplicedCurve(prepared.reference, curve, curve.t_start)
+    if collision == "boxes":
+        times = checker.times(prepared.t_end)
+        if first_entry(prepared.occupancy, driven.sample(times[times >= curve.t_start - 1e-9])) is not None:
+            return False
+    elif checker.contact(driven, prepared.t_end) is not None:
+        return False
+    if not road or checker.road is None:
+        return True
+    states = checker.drive(driven, prepared.t_end)
+    late = states.t >= curve.t_start - 1e-9
+    return checker.road.first_off_road(states.x[late], states.y[late], states.orientation[late]) is None
+
+
+def maneuvers_at(
+    reference: Curve,
+    t_start: float,
+    t_end: float,
+    maneuver: EvasiveManeuver,
+    settings: EvasiveConfig,
+    vehicle: Vehicle,
+) -> Sequence[EvasiveCurve]:
+    """The variants of a manoeuvre from ``t_start`` on: one along the path, one for each offset of steering."""
+    path_s, path_l = _path_of(reference, t_end)
+    state = reference.sample([t_start])
+    s, v = float(state.position[0, 0]), max(float(state.velocity[0, 0]), 0.0)
+    duration = t_end - t_start
+    if maneuver is EvasiveManeuver.BRAKE:
+        along = [(0.0, s, v, -settings.a_brake)]
+        stop = v / settings.a_brake
+        along.append((stop, s + 0.5 * v * stop, 0.0, 0.0))
+    elif maneuver is EvasiveManeuver.KICK_DOWN:
+        along = _kick_down(s, v, duration, settings.a_kick, vehicle)
+    else:
+        along = [(0.0, s, v, 0.0)]
+    straight = [(0.0, 0.0, 0.0, 0.0, 0.0)]
+    profiles = [straight]
+    if maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT):
+        sign = 1.0 if maneuver is EvasiveManeuver.STEER_LEFT else -1.0
+        count = max(1, int(np.floor(settings.offset_max / settings.offset_step + 1e-9)))
+        acceleration, jerk = _steering(v, settings, vehicle)
+        if acceleration <= 0.0:
+            return ()
+        offsets = settings.offset_step * np.arange(1, count + 1)
+        profiles = [_swerve(sign * float(offset), acceleration, jerk) for offset in offsets]
+    return [
+        EvasiveCurve(t_start, t_end, frozen(along), frozen(across), path_s, path_l) for across in profiles
+    ]
+
+
+def _path_of(reference: Curve, t_end: float) -> tuple[Array, Array]:
+    """The reference's path as l over s, continued at its last offset."""
+    points = reference.sample(np.linspace(0.0, t_end, max(int(20 * t_end), 2))).position
+    s, index = np.unique(np.maximum.accumulate(points[:, 0]), return_index=True)
+    return frozen(s), frozen(points[index, 1])
+
+
+def _kick_down(s: float, v: float, duration: float, a_kick: float, vehicle: Vehicle) -> list[tuple[float, ...]]:
+    """Full throttle: ``a_kick`` as far as the engine goes (power limit above v_switch, top speed)."""
+    phases, t = [], 0.0
+    while t < duration - 1e-9:
+        a = min(a_kick, vehicle.a_max * min(1.0, vehicle.v_switch / max(v, 1e-9)))
+        a = max(0.0, min(a, (vehicle.v_max - v) / _ENGINE_STEP))
+        phases.append((t, s, v, a))
+        t, s, v = t + _ENGINE_STEP, s + v * _ENGINE_STEP + 0.5 * a * _ENGINE_STEP**2, v + a * _ENGINE_STEP
+    phases.append((t, s, v, 0.0))
+    return phases
+
+
+def _steering(v: float, settings: EvasiveConfig, vehicle: Vehicle) -> tuple[float, float]:
+    """Lateral acceleration and jerk [m/s², m/s³] at speed ``v``; the jerk of a point mass is unlimited.
+
+    The single-track model gives v**2 tan(delta) / L, with delta and its rate limited.
+    """
+    if settings.model == "point_mass":
+        return settings.a_steer, float("inf")
+    strongest = v**2 * np.tan(vehicle.steering_max) / vehicle.wheelbase
+    return min(settings.a_steer, float(strongest)), v**2 * vehicle.steering_rate_max / vehicle.wheelbase
+
+
+def _swerve(offset: float, acceleration: float, jerk: float) -> list[tuple[float, ...]]:
+    """To ``offset`` and straight again: two opposite pulses of lateral acceleration, ramps limited by the jerk.
+
+    A pulse with ramps r and plateau h moves ``a (h + r) (h + 2 r)`` in all; where the ramps alone move
+    farther than that, the peak is lowered.
+    """
+    distance, sign = abs(offset), float(np.sign(offset))
+    ramp = acceleration / jerk
+    if 2.0 * acceleration * ramp**2 >= distance:
+        acceleration = float(np.cbrt(0.5 * distance * jerk**2))
+        ramp, plateau = acceleration / jerk, 0.0
+    else:
+        plateau = 0.5 * (-3.0 * ramp + float(np.sqrt(ramp**2 + 4.0 * distance / acceleration)))
+    rise = 0.0 if ramp == 0.0 else acceleration / ramp
+    pulses = [(ramp, rise), (plateau, 0.0), (ramp, -rise), (ramp, -rise), (plateau, 0.0), (ramp, rise)]
+    steps = [acceleration, 0.0, -acceleration, -acceleration, 0.0, acceleration] if ramp == 0.0 else [0.0] * 6
+    phases, t, position, rate, bend = [], 0.0, 0.0, 0.0, 0.0
+    for (duration, slope), jump in zip(pulses, steps, strict=True):
+        bend += sign * jump  # a point mass changes its acceleration at once
+        if duration > 0.0:
+            phases.append((t, position, rate, bend, sign * slope))
+        position += rate * duration + 0.5 * bend * duration**2 + sign * slope * duration**3 / 6.0
+        rate += bend * duration + 0.5 * sign * slope * duration**2
+        bend += sign * slope * duration
+        t += duration
+    phases.append((t, offset, 0.0, 0.0, 0.0))
+    return phases

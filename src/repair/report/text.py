@@ -1,0 +1,194 @@
+"""What ``repair run`` prints: made from the content of ``result.json`` alone."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+__all__ = ["configuration_keys", "key_table", "preset_summary", "summary"]
+
+_KINDS = {
+    "margin": "the safety margin of obstacle {id} is entered",
+    "collision": "obstacle {id} is touched",
+    "off_road": "the reference leaves the road",
+    "kinematics": "the reference becomes impossible to drive",
+}
+_PROVENANCE = {
+    "official": "official file, sha256 {sha}",
+    "reconstruction": "bundled reconstruction of the paper's Scenario 1, not the official file",
+    "file": "file {name}, sha256 {sha}",
+    "memory": "from memory",
+}
+
+
+def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path] = ()) -> str:
+    """A readable account of a result.
+
+    Parameters
+    ----------
+    content : dict
+        See :func:`repair.export.to_dict`.
+    preset : str or None
+        The preset's name, for the headline.
+    written : sequence of Path
+        Files that were written.
+    """
+    origin = content["provenance"]
+    label = _PROVENANCE[origin["kind"]].format(name=origin["name"], sha=(origin["sha256"] or "")[:12])
+    rows = [
+        ("Scenario", f"{content['scenario']} ({label})"),
+        ("Backend", content["backend"] + (f", preset {preset}" if preset else "")),
+        ("Status", f"{content['status']}: {content['status_sentence']}"),
+        ("TTC", _ttc(content)),
+        ("F-TTR", _f_ttr(content)),
+    ]
+    if content["peak_deceleration_mps2"] is not None:
+        rows.append(("Repair", _extremes(content)))
+    lines = [f"{name:9} {text}" for name, text in rows]
+    if not content["complete"]:
+        lines.append("          The search was stopped early: a later time-to-repair may be feasible.")
+    if content["probes"]:
+        lines += ["", *_probe_table(content["probes"])]
+    lines += ["", f"Time      {_times(content['time_s'])}"]
+    lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(content["notes"])]
+    if written:
+        lines += [f"{'Files' if k == 0 else '':9} {path}" for k, path in enumerate(written)]
+    else:
+        lines.append("Files     none written; --out DIR writes result.json, the solution file and figures")
+    return "\n".join(lines)
+
+
+def _ttc(content: dict[str, Any]) -> str:
+    conflict = content["conflict"]
+    if content["ttc_s"] is None:
+        return "none: the reference runs into nothing"
+    kind = conflict["kind"]
+    what = _KINDS.get(kind, kind).format(id=conflict["obstacle_id"])
+    touch = content["contact_ttc_s"]
+    contact = ""
+    if touch is not None:
+        behind = ", from behind" if conflict["from_behind"] else ""
+        contact = f"; true shapes touch at {touch:.2f} s (obstacle {conflict['contact_obstacle_id']}{behind})"
+    return f"{content['ttc_s']:.2f} s: {what}{contact}"
+
+
+def _f_ttr(content: dict[str, Any]) -> str:
+    if content["f_ttr_s"] is not None:
+        how = f", {content['maneuver'].replace('_', ' ')}" if content["maneuver"] else ""
+        return f"{content['f_ttr_s']:.2f} s{how}"
+    return "unlimited: there is nothing to react to" if content["status"] == "no_conflict" else "none"
+
+
+def _extremes(content: dict[str, Any]) -> str:
+    return (
+        f"peak deceleration {content['peak_deceleration_mps2']:.2f} m/s², "
+        f"peak lateral acceleration {content['peak_lateral_acceleration_mps2']:.2f} m/s², "
+        f"minimum speed {content['min_speed_mps']:.2f} m/s"
+    )
+
+
+def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
+    head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_lat", "v_min", "solver", "solve", "check")
+    units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
+    table = [head, units]
+    for p in probes:
+        table.append(
+            (
+                f"{p['t_rep_s']:.2f}",
+                "feasible" if p["feasible"] else ", ".join(p["reasons"]),
+                (p["maneuver"] or "-").replace("_", " "),
+                *(_fixed(p[k]) for k in ("peak_deceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps")),
+                f"{p['solver_status']}, {p['iterations']} it.",
+                f"{1e3 * p['solve_time_s']:.1f}",
+                f"{1e3 * p['check_time_s']:.1f}",
+            )
+        )
+    widths = [max(len(row[k]) for row in table) for k in range(len(head))]
+    numbers = {0, 3, 4, 5, 7, 8}
+    lines = [
+        "  ".join(cell.rjust(w) if k in numbers else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths)))
+        for row in table
+    ]
+    details = [
+        f"  {p['t_rep_s']:.2f} s: {d['reason']} at {d['t_s']:.2f} s{': ' + d['detail'] if d['detail'] else ''}"
+        for p in probes
+        if not p["feasible"]
+        for d in p["details"]
+        if d["t_s"] is not None
+    ]
+    return [line.rstrip() for line in lines] + details
+
+
+def _fixed(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+def _times(seconds: dict[str, float]) -> str:
+    parts = {name: 1e3 * value for name, value in seconds.items()}
+    inner = [f"{name} {parts.pop(name):.1f}" for name in ("build", "solve", "check") if name in parts]
+    outer = [f"{name} {value:.0f}" for name, value in parts.items() if name != "search"]
+    whole = f"search {parts['search']:.1f}" if "search" in parts else ""
+    return ", ".join(outer) + (f"; {whole} ms ({', '.join(inner)})" if whole else " ms")
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of the configuration, as its schema declares it."""
+
+    name: str
+    type: str
+    default: str
+    meaning: str
+
+
+def configuration_keys() -> list[Key]:
+    """All keys in the order of the schema; the meaning is the comment beside the field."""
+    from repair.config import Config
+
+    def walk(section: Any, prefix: str) -> list[Key]:
+        source = inspect.getsource(section)
+        keys = []
+        for item in fields(section):
+            name = f"{prefix}{item.name}"
+            value = item.default_factory() if item.default is MISSING else item.default  # type: ignore[misc]
+            if is_dataclass(value):
+                keys += walk(type(value), f"{name}.")
+                continue
+            line = re.search(rf"^    {item.name}:[^#\n]*(?:#\s*(.*))?$", source, re.MULTILINE)
+            meaning = (line.group(1) if line else None) or ""
+            default = "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+            keys.append(Key(name, str(item.type).replace(" | None", " or null"), default, meaning))
+        return keys
+
+    return walk(Config, "")
+
+
+def key_table() -> str:
+    """Every configuration key with default, choices or range, and meaning, as a Markdown table."""
+    from repair.config import CHOICES, RANGES
+
+    lines = ["| key | default | possible | meaning |", "|---|---|---|---|"]
+    for key in configuration_keys():
+        meaning, possible = key.meaning, key.type
+        if key.name in CHOICES:
+            possible = ", ".join(f"`{c}`" for c in CHOICES[key.name])
+            meaning = "" if " | " in meaning and ":" not in meaning else meaning
+        elif key.name in RANGES:
+            low, high = RANGES[key.name]
+            possible = f"{low:g} to {high:g}" + (" or null" if key.type.endswith("null") else "")
+        lines.append(f"| `{key.name}` | `{key.default}` | {possible} | {meaning.replace('|', chr(92) + '|')} |")
+    return "\n".join(lines)
+
+
+def preset_summary(name: str) -> str:
+    """The comment at the head of a preset's file."""
+    import repair.config
+
+    lines = (Path(repair.config.__file__).with_name("presets") / f"{name}.yaml").read_text("utf-8").splitlines()
+    head = list(takewhile(lambda line: line.startswith("#"), lines))
+    return " ".join(line.lstrip("# ") for line in head)

@@ -1,0 +1,440 @@
+"""The NLP of the hard-constraint backend: its rows as matrices, and the CasADi function made of them.
+
+Everything that is linear in the control points (derivative limits, obstacles, room, direction of
+travel) is a constant matrix with bounds that change from problem to problem; only the accelerations
+and the curvature of the driven path are nonlinear. A :class:`Model` therefore depends on sizes and
+settings alone, is built once for each :class:`Structure` and kept for the life of the process.
+
+Rows are *Bernstein* control points: a polynomial piece lies in the convex hull of its Bernstein
+points, so that a bound on them is a bound on the curve at every time of the piece (Farouki, *The
+Bernstein polynomial basis: a centennial retrospective*, 2012). They span the same curve as the
+B-spline's control points and are the tighter hull.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from repair.bspline import basis_matrix, derivative_matrix, segment_matrix
+from repair.errors import BackendError
+from repair.types import Array, frozen
+
+__all__ = ["SAMPLED", "Model", "Solution", "Structure", "bernstein_rows", "build_model"]
+
+#: Parameters of every sample of the nonlinear rows: the part of s, s', s'', l, l', l'' that does not
+#: depend on the unknowns, and the axis' curvature as a line in s (value, slope).
+SAMPLED = 8
+# Added to the squared speed [m²/s²] where the path's curvature divides by it.
+_STANDSTILL = 0.01
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What a :class:`Model` depends on.
+
+    Attributes
+    ----------
+    n : int
+        Number of control points; the first ``degree`` of them are given.
+    degree : int
+    spacing : float
+        Knot spacing [s].
+    windows : int
+        Windows to a segment, within each of which an obstacle is passed on one side.
+    lateral : bool
+        l is unknown too.
+    sampled : bool
+        Obstacle rows at the Greville times instead of the windows' Bernstein points.
+    weights : tuple of float
+        Of acceleration, jerk and distance to the reference.
+    solver : str
+        ``ipopt`` or ``sqpmethod``.
+    max_iterations : int
+    tolerance : float
+    timed : bool
+        The solver asks after every iteration whether there is time left.
+    """
+
+    n: int
+    degree: int
+    spacing: float
+    windows: int
+    lateral: bool
+    sampled: bool
+    weights: tuple[float, float, float]
+    solver: str
+    max_iterations: int
+    tolerance: float
+    timed: bool = False
+
+    @property
+    def segments(self) -> int:
+        """Number of polynomial pieces."""
+        return self.n - self.degree
+
+    @property
+    def axes(self) -> int:
+        """1 or 2: s, or s and l."""
+        return 2 if self.lateral else 1
+
+
+def _sub_bernstein(degree: int, start: float, end: float) -> Array:
+    """Map (p+1, p+1) from a segment's B-spline points to the Bernstein points of its part [start, end]."""
+    p = degree
+    shift = np.zeros((p + 1, p + 1))
+    for i in range(p + 1):
+        for k in range(i, p + 1):
+            shift[i, k] = comb(k, i) * start ** (k - i) * (end - start) ** i
+    to_bernstein = np.array([[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)])
+    return np.asarray(to_bernstein @ shift @ segment_matrix(p))
+
+
+@lru_cache(maxsize=256)
+def bernstein_rows(n: int, degree: int, cuts: tuple[int, ...]) -> Array:
+    """Bernstein points of a uniform spline's pieces as a linear map of its control points.
+
+    Parameters
+    ----------
+    n, degree : int
+        Of the spline.
+    cuts : tuple of int
+        Into how many equal pieces each of the n - degree segments is cut.
+
+    Returns
+    -------
+    (sum(cuts) * degree + 1, n) array
+        Row ``k * degree + j`` is point j of piece k; neighbours share their end point. For degree 0
+        one row for each segment.
+    """
+    if degree == 0:
+        return frozen(np.eye(n))
+    matrix = np.zeros((sum(cuts) * degree + 1, n))
+    row = 0
+    for segment, pieces in enumerate(cuts):
+        for k in range(pieces):
+            part = _sub_bernstein(degree, k / pieces, (k + 1) / pieces)
+            matrix[row : row + degree + 1, segment : segment + degree + 1] = part
+            row += degree
+    return frozen(matrix)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Linear rows of one axis: ``matrix`` (R, n) times that axis' control points."""
+
+    family: str
+    axis: int
+    matrix: Array
+
+    @property
+    def times(self) -> Array:
+        """Where along the control points each row acts, as an index (R,)."""
+        weight = np.abs(self.matrix)
+        return np.asarray(weight @ np.arange(self.matrix.shape[1]) / np.maximum(weight.sum(axis=1), 1e-12))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What the solver left.
+
+    Attributes
+    ----------
+    points : (n, 2) array
+    word : str
+        The solver's return status, or the first line of what it threw.
+    success : bool
+    iterations : int
+    """
+
+    points: Array
+    word: str
+    success: bool
+    iterations: int
+
+
+class Model:
+    """One NLP: constant matrices, and the solver function.
+
+    Unknowns are the free control points ``x = [s_p .. s_{n-1}, l_p .. l_{n-1}]``.
+
+    Attributes
+    ----------
+    velocity, acceleration, jerk, position : Array
+        Rows (R, n) of Bernstein points of the curve and its derivatives; ``position`` by window.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        begin = time.perf_counter()
+        self.structure = s = structure
+        n, p, h, segments = s.n, s.degree, s.spacing, s.segments
+        # The given state fixes the first Bernstein points; there the hull must be tight to let through
+        # a start at a limit.
+        first = (max(s.windows, 4),) + (1,) * (segments - 1)
+        self.velocity = bernstein_rows(n - 1, p - 1, first) @ derivative_matrix(n, 1, h)
+        self.acceleration = bernstein_rows(n - 2, p - 2, (1,) * segments) @ derivative_matrix(n, 2, h)
+        self.jerk = bernstein_rows(n - 3, p - 3, (1,) * segments) @ derivative_matrix(n, 3, h)
+        self.position = bernstein_rows(n, p, (s.windows,) * segments)
+        if s.sampled:
+            greville = (np.arange(p, n) - (p - 1) / 2) * h
+            self.obstacle = basis_matrix(np.minimum(greville, segments * h), n, p, h)
+        else:
+            self.obstacle = self.position
+        self.tau = np.arange(1, segments * s.windows + 1) * (h / s.windows)
+        self.samples = tuple(basis_matrix(self.tau, n, p, h, k) for k in range(3))
+        self._quadratic()
+        self._function: Any = None
+        self._deadline: _Deadline | None = None
+        self._linear = self._linear_rows()
+        self._compile()
+        self.build_time = time.perf_counter() - begin
+
+    # -- matrices --------------------------------------------------------------------------------
+
+    def _quadratic(self) -> None:
+        """Exact integrals of the squared derivatives and of the squared distance (Gauss-Legendre)."""
+        s = self.structure
+        nodes, weights = np.polynomial.legendre.leggauss(s.degree + 1)
+        tau = ((np.arange(s.segments)[:, None] + 0.5 * (nodes + 1.0)) * s.spacing).ravel()
+        weight = np.tile(0.5 * s.spacing * weights, s.segments)
+        self.gauss_tau = tau
+        basis = [basis_matrix(tau, s.n, s.degree, s.spacing, k) for k in range(4)]
+        w_acceleration, w_jerk, w_reference = s.weights
+        self.hessian = 2.0 * sum(
+            w * basis[k].T @ (weight[:, None] * basis[k])
+            for w, k in ((w_acceleration, 2), (w_jerk, 3), (w_reference, 0))
+        )
+        self.reference_weight = 2.0 * w_reference * weight
+        self.pull = basis[0].T * self.reference_weight  # times the reference's positions at gauss_tau
+
+    def _linear_rows(self) -> list[Rows]:
+        rows = [
+            Rows("velocity", 0, self.velocity),
+            Rows("acceleration", 0, self.acceleration),
+            Rows("jerk", 0, self.jerk),
+            Rows("obstacles", 0, self.obstacle),
+        ]
+        if self.structure.lateral:
+            rows += [
+                Rows("velocity", 1, self.velocity),
+                Rows("acceleration", 1, self.acceleration),
+                Rows("jerk", 1, self.jerk),
+                Rows("obstacles", 1, self.obstacle),
+            ]
+            if self.structure.sampled:
+                rows.append(Rows("road", 1, self.position))
+        return rows
+
+    @property
+    def linear(self) -> list[Rows]:
+        """The linear rows by family; ``obstacles`` of l include the road."""
+        return self._linear
+
+    # -- CasADi ----------------------------------------------------------------------------------
+
+    def _compile(self) -> None:
+        import casadi as ca
+
+        s, p = self.structure, self.structure.degree
+        m = s.n - p
+        x = ca.SX.sym("x", m * s.axes)
+        count = len(self.tau)
+        data = ca.SX.sym("data", count, SAMPLED)
+        slope = ca.SX.sym("slope", m * s.axes)
+        tangent = ca.SX.sym("tangent")
+        hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
+        objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
+        axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
+        self._kept: list[tuple[np.ndarray, ...]] = []
+        g = []
+        for rows in self._linear:
+            keep = np.abs(rows.matrix[:, p:]).max(axis=1) > 1e-12
+            self._kept.append((np.flatnonzero(keep),))
+            g.append(ca.mtimes(_sparse(rows.matrix[keep][:, p:]), axes[rows.axis]))
+        if s.lateral:
+            free = _sparse(self.velocity[self._kept[0][0]][:, p:])
+            along, across = ca.mtimes(free, axes[0]), ca.mtimes(free, axes[1])
+            g += [tangent * along - across, tangent * along + across]
+        g += self._nonlinear(axes, data)
+        parameters = ca.vertcat(ca.vec(data), slope, tangent)
+        nlp = {"x": x, "p": parameters, "f": objective, "g": ca.vertcat(*g)}
+        self._function = self._make_solver(nlp)
+
+    def _nonlinear(self, axes: list[Any], data: Any) -> list[Any]:
+        """Accelerations and curvature of the driven path at the samples.
+
+        With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the
+        acceleration (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2).
+        """
+        import casadi as ca
+
+        p = self.structure.degree
+        free = [_sparse(b[:, p:]) for b in self.samples]
+        s, v, a = (ca.mtimes(free[k], axes[0]) + data[:, k] for k in range(3))
+        if self.structure.lateral:
+            l, w, b = (ca.mtimes(free[k], axes[1]) + data[:, 3 + k] for k in range(3))  # noqa: E741
+        else:
+            l, w, b = data[:, 3], data[:, 4], data[:, 5]  # noqa: E741
+        slope = data[:, 7]
+        kappa = data[:, 6] + slope * s
+        scale = 1.0 - kappa * l
+        along = scale * a - 2.0 * kappa * v * w - slope * l * v**2
+        across = b + scale * kappa * v**2
+        rows = [along**2 + across**2, across]
+        if self.structure.lateral:
+            forward = scale * v
+            rows += [along, (forward * across - w * along) / (forward**2 + w**2 + _STANDSTILL) ** 1.5]
+        return rows
+
+    def _make_solver(self, nlp: dict[str, Any]) -> Any:
+        import casadi as ca
+
+        s = self.structure
+        options: dict[str, Any] = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
+        if s.timed:
+            self._deadline = _deadline_callback(nlp)
+            options["iteration_callback"] = self._deadline.callback
+        if s.solver == "ipopt":
+            options["ipopt"] = {
+                "print_level": 0, "sb": "yes", "max_iter": s.max_iterations, "tol": s.tolerance,
+                "constr_viol_tol": 1e-8, "bound_relax_factor": 0.0, "mu_strategy": "adaptive",
+            }  # fmt: skip
+        else:
+            options |= {
+                "print_header": False, "print_iteration": False, "print_status": False,
+                "max_iter": s.max_iterations, "tol_pr": 1e-8, "tol_du": max(s.tolerance, 1e-6),
+                "qpsol": "daqp", "qpsol_options": {"error_on_fail": False},
+                "hessian_approximation": "exact", "convexify_strategy": "eigen-clip",
+            }  # fmt: skip
+        try:
+            return ca.nlpsol("repair", s.solver, nlp, options)
+        except RuntimeError as error:
+            raise BackendError(f"CasADi cannot make the solver {s.solver!r}: {_first_line(error)}") from error
+
+    def solve(
+        self,
+        head: Array,
+        tail: Array,
+        data: Array,
+        slope: Array,
+        tangent: float,
+        lower: list[Array],
+        upper: list[Array],
+        deadline: float | None,
+    ) -> Solution:
+        """Run the solver.
+
+        Parameters
+        ----------
+        head, tail : (p, 2), (n - p, 2) array
+            Given control points; initial guess of the others.
+        data : (S, 8) array
+            See :data:`SAMPLED`.
+        slope : (n, axes) array
+            Linear part of the objective.
+        tangent : float
+            Largest l' / s'.
+        lower, upper : list of arrays
+            Bounds of all rows: those of :attr:`linear` in order, then the nonlinear ones.
+        """
+        s, p = self.structure, self.structure.degree
+        low, high = self._free_bounds(head, lower, upper, tangent)
+        x0 = tail[:, : s.axes].T.ravel()
+        parameters = np.concatenate([data.T.ravel(), slope[p:].T.ravel(), [tangent]])
+        if self._deadline is not None:
+            self._deadline.at = deadline if deadline is not None else float("inf")
+        try:
+            out = self._function(x0=x0, p=parameters, lbg=low, ubg=high)
+            x = np.asarray(out["x"]).reshape(s.axes, -1).T
+            stats = self._function.stats()
+            word, success = str(stats["return_status"]), bool(stats["success"])
+            iterations = int(stats.get("iter_count", 0))
+        except RuntimeError as error:
+            x, word, success, iterations = tail[:, : s.axes], _first_line(error), False, 0
+        points = np.vstack([head, tail])
+        points[p:, : s.axes] = x
+        return Solution(points, word, success, iterations)
+
+    def _free_bounds(
+        self, head: Array, lower: list[Array], upper: list[Array], tangent: float
+    ) -> tuple[Array, Array]:
+        """Bounds of the rows that the unknowns can move, with the given points' share taken off."""
+        p = self.structure.degree
+        low, high = [], []
+        count = len(self._linear)
+        for rows, (kept,), below, above in zip(self._linear, self._kept, lower, upper, strict=False):
+            share = rows.matrix[kept][:, :p] @ head[:, rows.axis]
+            low.append(below[kept] - share)
+            high.append(above[kept] - share)
+        if self.structure.lateral:
+            given = self.velocity[self._kept[0][0]][:, :p] @ head
+            for sign in (-1.0, 1.0):
+                low.append(-(tangent * given[:, 0] + sign * given[:, 1]))
+                high.append(np.full(len(given), np.inf))
+        low += lower[count:]
+        high += upper[count:]
+        return np.concatenate(low), np.concatenate(high)
+
+
+class _Deadline:
+    """Holds CasADi's callback and the time at which it stops the solver."""
+
+    def __init__(self) -> None:
+        self.at = float("inf")
+        self.callback: Any = None
+
+
+def _deadline_callback(nlp: dict[str, Any]) -> _Deadline:
+    import casadi as ca
+
+    holder = _Deadline()
+    sizes = {"x": nlp["x"].numel(), "f": 1, "g": nlp["g"].numel(), "lam_x": nlp["x"].numel(),
+             "lam_g": nlp["g"].numel(), "lam_p": nlp["p"].numel()}  # fmt: skip
+
+    class Watch(ca.Callback):  # type: ignore[misc]
+        def __init__(self) -> None:
+            ca.Callback.__init__(self)
+            self.construct("watch", {})
+
+        def get_n_in(self) -> int:
+            return int(ca.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_name_in(self, i: int) -> str:
+            return str(ca.nlpsol_out(i))
+
+        def get_name_out(self, i: int) -> str:
+            return "ret"
+
+        def get_sparsity_in(self, i: int) -> Any:
+            return ca.Sparsity.dense(sizes[ca.nlpsol_out(i)], 1)
+
+        def eval(self, arg: Any) -> list[int]:
+            return [1 if time.perf_counter() > holder.at else 0]
+
+    holder.callback = Watch()
+    return holder
+
+
+def _sparse(matrix: Array) -> Any:
+    import casadi as ca
+
+    return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
+
+
+def _first_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__
+
+
+@lru_cache(maxsize=256)
+def build_model(structure: Structure) -> Model:
+    """The model of a structure; built at the first call, kept after that."""
+    return Model(structure)

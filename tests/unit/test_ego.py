@@ -1,0 +1,392 @@
+"""The soft backend: costs and gradients against the literal transcription, optima against exact ones."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks import literal
+from scipy.optimize import minimize
+
+from repair.bspline import UniformBSpline, fit_to_curve, n_points_for
+from repair.config import EgoConfig
+from repair.solvers import ego
+from repair.types import FrenetTrajectory, Maneuver, Passing, Side, SolveStatus, frozen
+from tests import toy
+
+SIDES = (Side.BEHIND, Side.AHEAD, Side.LEFT, Side.RIGHT)
+# 1. a block on the path, 2. a car that comes from the right, 3. a car in front that brakes
+BOXES = (
+    toy.box((22.0, 30.0), (-1.5, 1.2)),
+    toy.box((14.0, 24.0), (-9.0, -4.0), v=(0.0, 3.0)),
+    toy.box((12.0, 20.0), (-1.0, 1.0), v=(4.0, 0.0)),
+)
+
+
+def passing_by(problem, side):
+    """A guide that moves to that side of everything; whether it is free does not matter here."""
+    t = problem.t_rep + toy.DT * np.arange(round((problem.t_end - problem.t_rep) / toy.DT) + 1)
+    tau = t - problem.t_rep
+    rate = {Side.BEHIND: -4.0, Side.AHEAD: 2.0}.get(side, 0.0)
+    sideways = {Side.LEFT: 3.0, Side.RIGHT: -3.0}.get(side, 0.0) * np.clip(tau / 1.5, 0.0, 1.0)
+    v0 = problem.start[1, 0]
+    stop = np.minimum(tau, v0 / 4.0) if rate < 0 else tau
+    position = np.column_stack([problem.start[0, 0] + v0 * stop + 0.5 * rate * stop**2, sideways])
+    rest = frozen(np.zeros((len(t), 2)))
+    guide = FrenetTrajectory(frozen(t), frozen(position), rest, rest, rest)
+    return Passing(Maneuver.YIELD, guide, np.full((len(problem.occupancy), len(t)), side, dtype=np.int8), 0.0)
+
+
+def make_problem(side=Side.BEHIND, *, boxes=BOXES, **keys):
+    bare = toy.problem(boxes, **keys)
+    return replace(bare, passing=passing_by(bare, side))
+
+
+def swerving_reference(n=14, spacing=0.4):
+    rng = np.random.default_rng(5)
+    s = 10.0 * spacing * np.arange(n)
+    return UniformBSpline(0.0, spacing, 3, frozen(np.column_stack([s, 0.4 * rng.normal(size=n)])))
+
+
+def costs_of(monkeypatch, problem, config=None, **keys):
+    """The two costs that the backend makes for a problem, and its result."""
+    made = []
+    for name in ("_Cost", "_RefineCost"):
+        kind = getattr(ego, name)
+        monkeypatch.setattr(ego, name, lambda *a, kind=kind, **k: made.append(kind(*a, **k)) or made[-1])
+    result = ego.EgoBackend(config or EgoConfig(rebounds=0), **keys).solve(problem)
+    monkeypatch.undo()
+    return made[0], made[-1], result
+
+
+def size_of(cost, first, last, axes):
+    return (last - first) * axes
+
+
+CASES = [
+    pytest.param(side, lateral, t_end, spacing, id=f"{side.name.lower()}-{'sl' if lateral else 's'}-{t_end}-{spacing}")
+    for side in SIDES
+    for lateral in (True, False)
+    for t_end, spacing in ((4.0, 0.4), (2.5, 0.2))
+]
+
+
+@pytest.mark.parametrize(("side", "lateral", "t_end", "spacing"), CASES)
+@pytest.mark.parametrize("precondition", [True, False])
+def test_gradients_by_finite_differences(monkeypatch, side, lateral, t_end, spacing, precondition):
+    problem = make_problem(side, t_end=t_end, lateral=lateral)
+    config = EgoConfig(rebounds=0, precondition=precondition, max_iterations=20)
+    deformation, refinement, _ = costs_of(monkeypatch, problem, config, spacing=spacing)
+    n = n_points_for(t_end, spacing, 3)
+    rng = np.random.default_rng(0)
+    axes = 2 if lateral else 1
+    for cost, last in ((deformation, n), (refinement, n - 3)):
+        size = size_of(cost, 3, last, axes)
+        metre = 0.5 if not precondition else 0.5 / np.abs(cost.w).max()
+        for scale in (0.1, 1.0, 10.0):  # the last one lies beyond all joints
+            y = scale * metre * rng.normal(size=size)
+            _, gradient = cost(y)
+            for _ in range(3):
+                direction = rng.normal(size=size)
+                direction /= np.linalg.norm(direction)
+                step = 1e-5 * metre
+                numeric = (cost(y + step * direction)[0] - cost(y - step * direction)[0]) / (2.0 * step)
+                room = 1e-5 * np.linalg.norm(gradient) + 1e-10 * abs(cost(y)[0]) / step
+                assert gradient @ direction == pytest.approx(numeric, abs=room)
+
+
+@pytest.mark.parametrize(("side", "lateral", "t_end", "spacing"), CASES)
+def test_costs_are_the_literal_ones(monkeypatch, side, lateral, t_end, spacing):
+    problem = make_problem(side, t_end=t_end, lateral=lateral)
+    config = EgoConfig(rebounds=0, w_v=0.7, w_a=1.3, w_j=0.4)
+    config.deform.smooth, config.deform.feasible, config.refine.smooth = 1.5, 0.8, 0.7
+    config.refine.feasible, config.refine.fit = 3.0, 0.6
+    deformation, refinement, result = costs_of(monkeypatch, problem, config, spacing=spacing)
+    check_costs(problem, config, spacing, deformation, refinement, result)
+
+
+def check_costs(problem, config, spacing, deformation, refinement, result):
+    n = n_points_for(problem.t_end - problem.t_rep, spacing, 3)
+    axes = [0, 1] if problem.lateral else [0]
+    bounds = literal.bounds_of(problem, config)
+    initial = fit_to_curve(problem.reference, problem.t_rep, n, 3, spacing)
+    shape = initial.points.copy()
+    guide = problem.passing.guide
+    for i in range(3, n):
+        shape[i] = [np.interp(initial.greville[i], guide.t, guide.position[:, r]) for r in range(2)]
+    pairs = literal.make_pairs(problem, shape.tolist(), 3, spacing)
+    if not problem.lateral:
+        pairs = [p for p in pairs if p.v[1] == 0.0]
+    deformed = result.stages["deformation"].points.tolist()
+    rng = np.random.default_rng(1)
+    for scale in (0.0, 0.3, 3.0):
+        y = scale * rng.normal(size=(n - 3) * len(axes))
+        value, gradient = deformation(y)
+        points = deformation.points(y).tolist()
+        weights = config.deform
+        expected, slope = literal.deformation_cost(
+            points, pairs, spacing, bounds, weights.smooth, weights.collision, weights.feasible
+        )
+        assert value == pytest.approx(expected, rel=1e-9)
+        chained = pulled_back(deformation, np.array(slope)[3:, axes], y)
+        np.testing.assert_allclose(gradient, chained, rtol=1e-9, atol=1e-9 * np.abs(gradient).max())
+
+        y = scale * rng.normal(size=(n - 6) * len(axes))
+        value, gradient = refinement(y)
+        weights = config.refine
+        expected, slope = literal.refinement_cost(
+            refinement.points(y).tolist(), deformed, 3, spacing, bounds, weights.smooth, weights.feasible, weights.fit
+        )
+        assert value == pytest.approx(expected, rel=1e-9)
+        chained = pulled_back(refinement, np.array(slope)[3 : n - 3, axes], y, last=n - 3)
+        np.testing.assert_allclose(gradient, chained, rtol=1e-9, atol=1e-9 * np.abs(gradient).max())
+
+
+def pulled_back(cost, slope, y, last=None):
+    """Gradient with respect to the coordinates y; points(y) is affine, so unit steps give it exactly."""
+    axes = [0, 1] if slope.shape[1] == 2 else [0]
+    origin = cost.points(np.zeros_like(y))
+    columns = [(cost.points(e) - origin)[3:last, axes].ravel() for e in np.eye(len(y))]
+    return np.array(columns) @ slope.ravel()
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_pairs_are_the_literal_ones(side):
+    boxes = (*BOXES, toy.box((5.0, 60.0), (-1.0, 1.0), present=(1.0, 2.0)))  # appears and disappears
+    problem = make_problem(side, boxes=boxes, t_rep=0.3)
+    n = n_points_for(3.7, 0.4, 3)
+    shape = fit_to_curve(problem.reference, 0.3, n, 3, 0.4)
+    pairs = ego.anchor_pairs(problem, shape.greville, shape.points, 3)
+    mine = {
+        (int(i), int(axis), float(sign), round(float(anchor), 9), round(float(s_f), 9))
+        for i, axis, sign, anchor, s_f in zip(*pairs, strict=True)
+    }
+    expected = set()
+    for pair in literal.make_pairs(problem, shape.points.tolist(), 3, 0.4):
+        axis = 0 if pair.v[0] != 0.0 else 1
+        expected.add((pair.i, axis, pair.v[axis], round(pair.p[axis], 9), round(pair.s_f, 9)))
+    assert mine == expected
+    assert len(pairs.row) == len(expected)
+    assert min(pairs.row) >= 3
+
+
+def test_distance_is_that_of_definition_3():
+    problem = make_problem(Side.BEHIND)
+    shape = fit_to_curve(problem.reference, 0.0, 13, 3, 0.4)
+    pairs = ego.anchor_pairs(problem, shape.greville, shape.points, 3)
+    distances = pairs.distance(shape.points)
+    for k in range(len(pairs.row)):
+        v = np.zeros(2)
+        v[pairs.axis[k]] = pairs.sign[k]
+        anchor = shape.points[pairs.row[k]].copy()
+        anchor[pairs.axis[k]] = pairs.anchor[k]
+        assert distances[k] == pytest.approx((shape.points[pairs.row[k]] - anchor) @ v)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("lateral", [True, False])
+def test_soft_optimum_is_the_exact_one(monkeypatch, side, lateral):
+    """In the preconditioned coordinates the Hessian is at least the identity, which bounds the gap."""
+    problem = make_problem(side, lateral=lateral)
+    config = EgoConfig(rebounds=0, max_iterations=1000, tolerance=0.01)
+    deformation, refinement, result = costs_of(monkeypatch, problem, config)
+    n, axes = n_points_for(4.0, 0.4, 3), 2 if lateral else 1
+    for cost, size, found in (
+        (deformation, (n - 3) * axes, result.stages["deformation"].points),
+        (refinement, (n - 6) * axes, result.stages["refinement"].points),
+    ):
+        exact = newton(cost, np.zeros(size))
+        y = np.linalg.lstsq(
+            np.array([(cost.points(e) - cost.points(np.zeros(size))).ravel() for e in np.eye(size)]).T,
+            (found - cost.points(np.zeros(size))).ravel(), rcond=None,
+        )[0]  # fmt: skip
+        gap = cost(y)[0] - cost(exact)[0]
+        assert -1e-7 * abs(cost(exact)[0]) <= gap <= 0.5 * size * config.tolerance**2 + 1e-8 * abs(cost(exact)[0])
+        assert np.linalg.norm(y - exact) <= np.sqrt(size) * config.tolerance + 1e-5
+    assert result.status is SolveStatus.SOLVED
+    assert result.objective == pytest.approx(refinement(y)[0], rel=1e-9)
+
+
+def newton(cost, y):
+    """Minimum of a convex cost, by trust-region Newton with a Hessian of difference quotients."""
+
+    def hessian(y):
+        step = 1e-6
+        columns = [(cost(y + step * e)[1] - cost(y - step * e)[1]) / (2.0 * step) for e in np.eye(len(y))]
+        return 0.5 * (np.array(columns) + np.array(columns).T)
+
+    options = {"gtol": 1e-7, "maxiter": 3000}
+    return minimize(cost, y, jac=True, hess=hessian, method="trust-exact", options=options).x
+
+
+def test_refined_start_and_end_are_those_of_the_deformation():
+    result = ego.EgoBackend(EgoConfig(rebounds=0)).solve(make_problem(Side.LEFT))
+    deformed, refined = result.stages["deformation"], result.stages["refinement"]
+    np.testing.assert_array_equal(deformed.points[:3], refined.points[:3])
+    np.testing.assert_array_equal(deformed.points[-3:], refined.points[-3:])
+    assert not np.array_equal(deformed.points, refined.points)
+    np.testing.assert_array_equal(result.curve.points, refined.points)
+
+
+@pytest.mark.parametrize("t_rep", [0.0, 0.4, 1.1])
+@pytest.mark.parametrize("degree", [3, 4, 5])
+def test_repair_starts_in_the_state_of_the_reference(t_rep, degree):
+    reference = swerving_reference(24)
+    problem = make_problem(Side.BEHIND, t_rep=t_rep, reference=reference)
+    result = ego.EgoBackend(EgoConfig(rebounds=0), degree=degree, spacing=0.4).solve(problem)
+    start, wanted = result.curve.sample(t_rep), reference.sample(t_rep)
+    np.testing.assert_allclose(start.position, wanted.position, atol=1e-9)
+    np.testing.assert_allclose(start.velocity, wanted.velocity, atol=1e-8)
+    np.testing.assert_allclose(start.acceleration, wanted.acceleration, atol=1e-7)
+
+
+def test_without_lateral_freedom_the_reference_stands_sideways():
+    problem = make_problem(Side.BEHIND, lateral=False, reference=swerving_reference())
+    result = ego.EgoBackend(EgoConfig(rebounds=0)).solve(problem)
+    t = np.linspace(0.0, 4.0, 41)
+    initial = fit_to_curve(problem.reference, 0.0, 13, 3, 0.4)
+    np.testing.assert_allclose(result.curve.sample(t).position[:, 1], initial.sample(t).position[:, 1], atol=1e-12)
+
+
+def test_costs_are_the_literal_ones_where_the_reference_swerves(monkeypatch):
+    problem = make_problem(Side.BEHIND, lateral=True, reference=swerving_reference())
+    config = EgoConfig(rebounds=0)
+    check_costs(problem, config, 0.4, *costs_of(monkeypatch, problem, config))
+
+
+def test_costs_include_what_stands_sideways(monkeypatch):
+    problem = make_problem(Side.BEHIND, lateral=False, reference=swerving_reference())
+    config = EgoConfig(rebounds=0)
+    check_costs(problem, config, 0.4, *costs_of(monkeypatch, problem, config))
+
+
+def test_free_road_keeps_a_straight_reference():
+    bare = toy.problem(())
+    result = ego.EgoBackend().solve(bare)
+    t = np.linspace(0.0, 4.0, 21)
+    np.testing.assert_allclose(result.curve.sample(t).position[:, 0], 10.0 * t, atol=1e-3)
+    assert result.status is SolveStatus.SOLVED
+    assert result.objective < 1e-3
+
+
+def test_a_wall_is_kept_clear_of_and_rebounds_push_harder():
+    boxes = (toy.box((25.0, 60.0), (-20.0, 20.0)),)
+    problem = make_problem(Side.BEHIND, boxes=boxes, lateral=False)
+    soft = ego.EgoBackend(EgoConfig(rebounds=0)).solve(problem)
+    config = EgoConfig(rebounds=6)
+    config.deform.collision = 0.001
+    weak = ego.EgoBackend(replace_rebounds(config, 0)).solve(problem)
+    hard = ego.EgoBackend(config).solve(problem)
+    end = [r.stages["deformation"].points[-1, 0] for r in (soft, weak, hard)]
+    assert end[0] < 25.0
+    assert end[1] > 25.0  # too soft: the control points collide
+    assert end[2] < end[1]
+    assert "round(s)" in hard.detail
+
+
+def replace_rebounds(config, rebounds):
+    return replace(config, rebounds=rebounds)
+
+
+def test_braking_does_not_reverse():
+    boxes = (toy.box((16.0, 60.0), (-20.0, 20.0)),)
+    problem = make_problem(Side.BEHIND, boxes=boxes, lateral=False, t_end=6.0)
+    result = ego.EgoBackend(EgoConfig()).solve(problem)
+    assert result.curve.sample(np.linspace(0.0, 6.0, 200)).velocity[:, 0].min() > -0.06
+
+
+def test_time_limit_gives_a_status_and_no_curve():
+    result = ego.EgoBackend(EgoConfig()).solve(make_problem(Side.LEFT), time_limit=0.0)
+    assert result.status is SolveStatus.TIME_LIMIT
+    assert result.curve is None
+    assert "0 s" in result.detail
+
+
+def test_iteration_limit_is_told():
+    result = ego.EgoBackend(EgoConfig(max_iterations=1, rebounds=0)).solve(make_problem(Side.LEFT))
+    assert result.status is SolveStatus.ITERATION_LIMIT
+    assert result.curve is not None
+
+
+def test_preconditioning_changes_the_path_and_not_the_goal():
+    problem = make_problem(Side.LEFT)
+    results = [
+        ego.EgoBackend(EgoConfig(rebounds=0, precondition=on, max_iterations=20_000, tolerance=1e-5)).solve(problem)
+        for on in (True, False)
+    ]
+    # The flat directions of the plain problem are hardly observed; what counts is the cost.
+    assert results[0].objective <= results[1].objective * (1 + 1e-3) + 1e-3
+    assert results[0].iterations < results[1].iterations
+
+
+def test_solving_twice_gives_the_same_and_leaves_the_problem_alone():
+    problem = make_problem(Side.RIGHT)
+    before = (problem.start.copy(), problem.occupancy.lower.copy(), problem.passing.side.copy())
+    backend = ego.EgoBackend()
+    first, second = backend.solve(problem), backend.solve(problem)
+    np.testing.assert_array_equal(first.curve.points, second.curve.points)
+    np.testing.assert_array_equal(before[0], problem.start)
+    np.testing.assert_array_equal(before[1], problem.occupancy.lower)
+    np.testing.assert_array_equal(before[2], problem.passing.side)
+    with pytest.raises(ValueError, match="read-only"):
+        first.curve.points[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("duration", [0.1, 0.4, 0.9, 1.3])
+def test_short_repairs_have_a_result(duration):
+    problem = make_problem(Side.BEHIND, t_rep=1.0, t_end=1.0 + duration)
+    result = ego.EgoBackend(spacing=0.4).solve(problem)
+    assert result.curve is not None
+    assert np.isfinite(result.curve.points).all()
+    assert result.curve.t_end >= problem.t_end - 1e-9
+
+
+def test_literal_two_stages_end_where_the_backend_ends():
+    problem = make_problem(Side.BEHIND, lateral=False)
+    config = EgoConfig(rebounds=0, max_iterations=2000, tolerance=1e-4)
+    begin = time.perf_counter()
+    plain = literal.repair_once(problem, config, 3, 0.4)
+    assert time.perf_counter() - begin < 60.0
+    result = ego.EgoBackend(config).solve(problem)
+    t = np.linspace(0.0, 4.0, 41)
+    np.testing.assert_allclose(
+        UniformBSpline(0.0, 0.4, 3, np.array(plain.refined)).sample(t).position, result.curve.sample(t).position,
+        atol=0.02,
+    )  # fmt: skip
+    assert plain.costs[1] == pytest.approx(result.objective, rel=1e-3)
+
+
+@pytest.mark.parametrize("degree", [3, 4, 5])
+def test_literal_fit_of_the_reference_is_the_backends(degree):
+    problem = make_problem(Side.BEHIND, t_rep=0.7)
+    plain = literal.fit_reference(problem, degree, 0.4)
+    fitted = fit_to_curve(problem.reference, 0.7, len(plain), degree, 0.4)
+    np.testing.assert_allclose(fitted.points, plain, atol=1e-6)
+
+
+def test_literal_search_finds_the_same_f_ttr_in_scenario_1(scenarios):
+    from repair.api import prepare
+    from repair.config import load_config
+    from repair.scene.commonroad import load_scene
+    from repair.search import search_f_ttr
+    from repair.solvers.registry import make_backend
+
+    path = scenarios / "DEU_Flensburg-6_1_T-1.xml"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not in COMMONROAD_SCENARIOS")
+    config = load_config(preset="scenario_1")
+    prepared = prepare(load_scene(path), config)
+    source, conflict, checker = prepared.source, prepared.conflict, prepared.checker
+    fast = search_f_ttr(source, conflict, make_backend("ego", config), checker, config.search)
+    plain = literal.literal_search(source, conflict, checker, config, check="direct")
+    assert conflict.time == pytest.approx(2.9)
+    assert plain.f_ttr == pytest.approx(fast.f_ttr)
+    assert plain.f_ttr == pytest.approx(1.6)
+    assert [p.t_rep for p in plain.probes] == pytest.approx([0.0, 0.8, 1.2, 1.6])
+    for slow, quick in zip(plain.probes, fast.probes, strict=True):
+        problem = source.at(slow.t_rep)[0]
+        t = np.linspace(problem.t_rep, problem.t_end, 30)
+        curve = UniformBSpline(problem.t_rep, 0.4, 3, np.array(slow.stages.refined))
+        np.testing.assert_allclose(curve.sample(t).position, quick.solve.curve.sample(t).position, atol=0.05)
