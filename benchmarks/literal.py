@@ -194,9 +194,8 @@ def f_slope(c_r: float, c_m: float, c_j: float, elastic: float) -> float:
 class Bounds:
     """c_m of V, A and J on each axis: ``highest[k][r]``, and ``lowest[k][r]`` as magnitudes.
 
-    The paper has one c_m for both signs. Here braking and accelerating may have different ones, and
-    longitudinal speeds below zero are penalised (``reverse``, from zero on, joint ``reverse_joint``),
-    which the paper does not do: its car can reverse.
+    The paper has one c_m for both signs; here braking and accelerating may have different ones, and
+    the lowest longitudinal speed is left to :func:`reversing`.
     """
 
     highest: list[list[float]]
@@ -216,21 +215,32 @@ def feasibility(points: Points, dt: float, bounds: Bounds) -> tuple[float, Point
         for i in range(len(control)):
             for r in range(2):
                 x = control[i][r]
+                if k == 0 and r == 0 and x < 0.0:
+                    continue
+                c_m = bounds.highest[k][r] if x >= 0.0 else bounds.lowest[k][r]
                 w = bounds.weights[k]
-                if x >= 0.0:
-                    c_m = bounds.highest[k][r]
-                    cost = w * f(x, c_m, bounds.joint * c_m, bounds.elastic)
-                    slope = w * f_slope(x, c_m, bounds.joint * c_m, bounds.elastic)
-                elif k == 0 and r == 0:
-                    cost = bounds.reverse * f(x, 0.0, bounds.reverse_joint, bounds.elastic)
-                    slope = bounds.reverse * f_slope(x, 0.0, bounds.reverse_joint, bounds.elastic)
-                else:
-                    c_m = bounds.lowest[k][r]
-                    cost = w * f(x, c_m, bounds.joint * c_m, bounds.elastic)
-                    slope = w * f_slope(x, c_m, bounds.joint * c_m, bounds.elastic)
+                cost = w * f(x, c_m, bounds.joint * c_m, bounds.elastic)
+                slope = w * f_slope(x, c_m, bounds.joint * c_m, bounds.elastic)
                 value += cost
                 for q in range(k + 2):
                     gradient[i + q][r] += slope * _STENCIL[k + 1][q] / dt ** (k + 1)
+    return value, gradient
+
+
+def reversing(points: Points, dt: float, bounds: Bounds) -> tuple[float, Points]:
+    """Penalty of longitudinal speeds below zero, f with c_m = 0, and its gradient.
+
+    Not in the paper, which bounds |v| and lets its car reverse. Its weight is not part of lambda_d.
+    """
+    value = 0.0
+    gradient = zeros(len(points))
+    v = derivatives(points, dt)[0]
+    for i in range(len(v)):
+        if v[i][0] < 0.0:
+            value += bounds.reverse * f(v[i][0], 0.0, bounds.reverse_joint, bounds.elastic)
+            slope = bounds.reverse * f_slope(v[i][0], 0.0, bounds.reverse_joint, bounds.elastic)
+            gradient[i][0] -= slope / dt
+            gradient[i + 1][0] += slope / dt
     return value, gradient
 
 
@@ -291,6 +301,7 @@ def deformation_cost(
         (smooth, smoothness(points, dt)),
         (collide, collision(points, pairs)),
         (feasible, feasibility(points, dt, bounds)),
+        (1.0, reversing(points, dt, bounds)),
     ]
     return weighted(terms, len(points))
 
@@ -309,6 +320,7 @@ def refinement_cost(
     terms = [
         (smooth, smoothness(points, dt)),
         (feasible, feasibility(points, dt, bounds)),
+        (1.0, reversing(points, dt, bounds)),
         (fit, fitting(points, deformed, p, dt)),
     ]
     return weighted(terms, len(points))

@@ -92,7 +92,8 @@ def test_feasibility_is_the_papers_with_its_gradient(n, seed):
     points = np.cumsum(rng.normal(size=(n, 2)) * [4.0, 1.0], axis=0)
     stack = np.vstack([derivative_matrix(n, k, dt) for k in (1, 2, 3)])
     value, slope = bounds(n).evaluate(stack @ points)
-    expected, gradient = literal.feasibility(points.tolist(), dt, literal_bounds())
+    parts = [part(points.tolist(), dt, literal_bounds()) for part in (literal.feasibility, literal.reversing)]
+    expected, gradient = sum(p[0] for p in parts), np.array(parts[0][1]) + np.array(parts[1][1])
     assert value == pytest.approx(expected, rel=1e-9)
     assert slope is not None
     np.testing.assert_allclose(stack.T @ slope, gradient, rtol=1e-9, atol=1e-9 * np.abs(gradient).max())

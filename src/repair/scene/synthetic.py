@@ -79,7 +79,9 @@ def _lanelet(name: int, curve: tuple[Sequence[float], float, list[Piece]], width
     center, heading = _curve(*curve, 5.0 if straight else 0.5)
     side = np.stack([-np.sin(heading), np.cos(heading)], axis=1) * width / 2.0
     kind = relations.pop("kind", LaneletType.URBAN)
-    return Lanelet(center + side, center, center - side, name, lanelet_type={kind}, **relations)
+    # neighbours share their corners to the last bit, else the union of the lanelets falls apart
+    left, middle, right = (np.round(points, 3) + 0.0 for points in (center + side, center, center - side))
+    return Lanelet(left, middle, right, name, lanelet_type={kind}, **relations)
 
 
 # ---------------------------------------------------------------------- vehicles
@@ -278,6 +280,11 @@ class RoadDamage:
     change_start, change_duration : float
         Its change into the second lane [s]; a quintic, at most 5.77 * lane_width / duration² sideways
         (1.3 m/s² here, an ordinary change).
+
+    Raises
+    ------
+    ConfigError
+        If a number is not finite, not positive where it has to be, or vehicles overlap at the start.
     """
 
     speed: float = 15.0
@@ -300,3 +307,126 @@ class RoadDamage:
             may_be_zero = item.name in ("change_start", "speed", "second_speed", "third_speed")
             if item.name not in ("second_gap", "third_gap") and (value < 0.0 or (value == 0.0 and not may_be_zero)):
                 raise ConfigError(f"RoadDamage.{item.name} is {value!r}; it has to be positive")
+        for name, least in (("damage_gap", 5.0), ("lane_width", 2.5)):  # else vehicles overlap at t = 0
+            if getattr(self, name) < least:
+                raise ConfigError(f"RoadDamage.{name} is {getattr(self, name)!r} m; it has to be at least {least} m")
+
+
+def scenario_2(damage: RoadDamage | None = None) -> tuple[Any, Any]:
+    """Road damage ahead in dynamic traffic (Sec. V-C): a reconstruction from the paper's words.
+
+    The ego drives in the rightmost of three lanes towards a damage that fills its lane; a car ahead
+    of it in the second lane and a car that changes from the third lane into the second, behind the
+    first one, leave it one gap.
+
+    Why these numbers. With 8.0 m inflated off the damage, TTC is 1.6 s; the ego's front is level
+    with it (8.0 - 2.15) / 15 = 0.39 s later, at 1.94 s. To get past, its body has to be
+    (2.0 + 1.67) / 2 = 1.84 m to the left by then. A quintic change by one lane (3.5 m) that begins at
+    0.8 s and peaks at 4.8 m/s² takes sqrt(5.77 * 3.5 / 4.8) = 2.05 s and is 2.2 m over when the front
+    is level. One that begins at 1.2 s has 0.74 s left: even a change of 1.45 s peaks at 9.6 m/s² and
+    needs 69 m/s³ of lateral jerk, where steering at 0.4 rad/s gives v² * 0.4 / 2.4 m = 37 m/s³.
+    Leaving the *inflated* box aside in time (2.0 + 1.0 = 3.0 m within 0.8 s) would take 9.4 m/s² at
+    least: the paper's 4.82 m/s² from 0.8 s on cannot come from respecting the box strictly.
+
+    Parameters
+    ----------
+    damage : RoadDamage, optional
+
+    Returns
+    -------
+    scenario, planning_problem_set
+        CommonRoad objects; 10 s in steps of 0.1 s. The ego is in its lane again at the end.
+    """
+    from commonroad.geometry.shape import Rectangle
+    from commonroad.scenario.obstacle import ObstacleType, StaticObstacle
+    from commonroad.scenario.state import InitialState
+
+    p = RoadDamage() if damage is None else damage
+    car = (4.5, 1.8)
+    t = np.arange(_STEPS + 1) * _DT
+    patch = StaticObstacle(
+        1, ObstacleType.CONSTRUCTION_ZONE, Rectangle(length=p.damage_length, width=p.damage_width),
+        InitialState(time_step=0, position=np.array([p.damage_gap + p.damage_length / 2.0, 0.0]), orientation=0.0,
+                     velocity=0.0, acceleration=0.0, yaw_rate=0.0, slip_angle=0.0),
+    )  # fmt: skip
+    tau = np.clip((t - p.change_start) / p.change_duration, 0.0, 1.0)
+    across = 2.0 - tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)  # in lanes, from 2 to 1
+    drift = -30.0 * (tau * (1.0 - tau)) ** 2 / p.change_duration * p.lane_width
+    still = np.zeros_like(t)
+    obstacles = [patch]
+    for name, gap, speed, y, sideways in (
+        (2, p.second_gap, p.second_speed, np.full_like(t, p.lane_width), still),
+        (3, p.third_gap, p.third_speed, across * p.lane_width, drift),
+    ):
+        xy = np.stack([gap + speed * t, y], axis=1)
+        obstacles.append(
+            _vehicle(name, "car", car, xy, np.arctan2(sideways, speed), np.hypot(speed, sideways), still)
+        )
+    lanelets = _expressway(p.lane_width, max(p.speed, p.second_speed, p.third_speed) * _STEPS * _DT, p)
+    scenario = _scenario("RepairRoadDamage", "highway", lanelets, obstacles)
+    return scenario, _problem(p.speed, scenario.lanelet_network.find_lanelet_by_id(111))
+
+
+def _expressway(width: float, reach: float, p: RoadDamage) -> list[Any]:
+    """Three lanes along x, cut in two: 101, 102, 103 from the right, then 111, 112, 113."""
+    from commonroad.scenario.lanelet import LaneletType
+
+    begin = min(p.second_gap, p.third_gap, 0.0) - 40.0
+    cut = p.damage_gap + p.damage_length + 30.0
+    end = max(cut, max(p.second_gap, p.third_gap, 0.0) + reach) + 60.0
+    lanelets = []
+    for first, start, length, successor, predecessor in (
+        (101, begin, cut - begin, 10, None), (111, cut, end - cut, None, -10),
+    ):  # fmt: skip
+        for lane in range(3):
+            name = first + lane
+            relations: dict[str, Any] = {"kind": LaneletType.HIGHWAY}
+            if lane < 2:
+                relations |= {"adjacent_left": name + 1, "adjacent_left_same_direction": True}
+            if lane > 0:
+                relations |= {"adjacent_right": name - 1, "adjacent_right_same_direction": True}
+            relations["successor"] = [] if successor is None else [name + successor]
+            relations["predecessor"] = [] if predecessor is None else [name + predecessor]
+            curve = (start, lane * width), 0.0, [(length, 0.0, 0.0)]
+            lanelets.append(_lanelet(name, curve, width, **relations))
+    return lanelets
+
+
+# ---------------------------------------------------------------------- files
+
+SCENARIOS: Mapping[str, Callable[[], tuple[Any, Any]]] = MappingProxyType(
+    {"scenario_1": scenario_1, "scenario_2": scenario_2}
+)
+"""Name to generator."""
+
+
+def write_scenario(name: str, folder: str | Path) -> Path:
+    """Write a generated scenario as CommonRoad 2020a XML, named after its benchmark id.
+
+    The same scenario gives the same bytes. The file is written aside and renamed.
+
+    Raises
+    ------
+    ConfigError
+        If there is no scenario of that name.
+    OutputError
+        If the file cannot be written.
+    """
+    from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
+
+    if name not in SCENARIOS:
+        raise ConfigError(f"there is no generated scenario {name!r}; there is {', '.join(SCENARIOS)}")
+    scenario, problems = SCENARIOS[name]()
+    target = Path(folder) / f"{scenario.scenario_id}.xml"
+    writer = CommonRoadFileWriter(scenario, problems, decimal_precision=4)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".writing-") as aside:
+            draft = Path(aside) / target.name
+            writer.write_to_file(str(draft), OverwriteExistingFile.ALWAYS)
+            content = re.sub(rb' date="[^"]*"', f' date="{_DATE}"'.encode(), draft.read_bytes(), count=1)
+            draft.write_bytes(content)
+            os.replace(draft, target)
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written: {error.strerror or error}") from error
+    return target
