@@ -18,7 +18,8 @@ from repair.kinematics import DrivenStates
 from repair.metrics import Peaks
 from repair.occupancy import build_occupancy, first_entry, shrink_to_start
 from repair.problems import ProblemFactory, resolve_limits
-from repair.reference import make_reference
+from repair.reference import known_until, make_reference, recorded_positions
+from repair.scene.reframe import as_ego, reframe
 from repair.search import search_f_ttr
 from repair.solvers.registry import make_backend
 from repair.types import Conflict, Curve, Limits, Occupancy, Probe, SearchResult, SearchStatus, Verdict
@@ -130,6 +131,11 @@ def prepare(scene: Scene, config: Config) -> Prepared:
         If no reference can be had.
     """
     phases = _Phases()
+    if config.reference.source in ("recorded", "file"):
+        positions, _ = recorded_positions(scene, config.reference)
+        scene = reframe(scene, positions[: known_until(positions)])
+        if config.reference.source == "recorded" and config.reference.obstacle_id is not None:
+            scene = as_ego(scene, config.reference.obstacle_id)
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
     s_offset = 0.5 * vehicle.length + _BODY_MARGIN if s_offset is None else s_offset

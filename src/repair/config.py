@@ -133,6 +133,7 @@ class CasadiConfig:
     w_jerk: float = 0.1
     w_reference: float = 0.05
     heading: float = 0.7  # largest angle between the driven path and the axis [rad]
+    presolve: bool = True  # the QP of the linear constraints first: a start, or the proof that there is none
     rounds: int = 5  # solves around the own solution until the exact constraints are kept
     max_iterations: int = 200
     tolerance: float = 1e-8

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from repair.baselines.bernstein import BernsteinCurve
 from repair.bspline import UniformBSpline
 from repair.checker import SplicedCurve
 from repair.errors import OutputError
@@ -61,7 +62,7 @@ def to_dict(result: RepairResult) -> dict[str, Any]:
         "complete": found.complete,
         "ttc_s": _number(conflict.time),
         "contact_ttc_s": _number(conflict.contact_time),
-        "f_ttr_s": _number(found.f_ttr),
+        "f_ttr_s": _number(found.f_ttr) if found.curve is not None else None,
         "conflict": {
             "kind": conflict.kind,
             "obstacle_id": conflict.obstacle_id,
@@ -197,9 +198,15 @@ def _curve(curve: Curve | None, t_end: float | None = None) -> dict[str, Any] | 
             "degree": curve.degree,
             "control_points_m": [_column(point, 12) for point in curve.points],
         }
-    as_dict = getattr(curve, "as_dict", None)
-    if as_dict is not None:
-        return dict(as_dict())
+    if isinstance(curve, BernsteinCurve):
+        return {
+            "type": "bernstein",
+            "t_start_s": _number(curve.t_start),
+            "t_end_s": _number(curve.t_end),
+            "spacing_s": _number(curve.duration),
+            "degree": curve.degree,
+            "control_points_m": [[_column(point, 12) for point in piece] for piece in curve.points],
+        }
     t_start, t_end = curve.t_start, min(curve.t_end, curve.t_end if t_end is None else t_end)
     samples = curve.sample(np.linspace(t_start, t_end, max(2, round((t_end - t_start) / 0.1) + 1)))
     return {

@@ -156,10 +156,12 @@ def relevant(occupancy: Occupancy, start: Array, t_start: float, t_end: float, r
     """
     if not len(occupancy):
         return occupancy
-    window = (occupancy.t >= t_start - 1e-9 - (occupancy.t[1] if len(occupancy.t) > 1 else 0.0)) & (
-        occupancy.t <= t_end + 1e-9
-    )
-    lower, upper = occupancy.lower[:, window], occupancy.upper[:, window]
+    first = max(int(np.searchsorted(occupancy.t, t_start + 1e-9, side="right")) - 1, 0)
+    last = int(np.searchsorted(occupancy.t, t_end - 1e-9, side="left"))
+    lower, upper = occupancy.lower[:, first : last + 1], occupancy.upper[:, first : last + 1]
+    # Between two steps a box stays within what both of them span (NaN: it is not there).
+    lower = np.concatenate([lower, np.minimum(lower[:, :-1], lower[:, 1:])], axis=1)
+    upper = np.concatenate([upper, np.maximum(upper[:, :-1], upper[:, 1:])], axis=1)
     near = (upper[..., 0] > reach[0]) & (lower[..., 0] < reach[1])
     near &= (upper[..., 1] > l_room[0]) & (lower[..., 1] < l_room[1])
     return occupancy.select(near.any(axis=1))

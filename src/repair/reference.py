@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
-__all__ = ["SpeedProfile", "make_reference", "plan_speed"]
+__all__ = ["SpeedProfile", "known_until", "make_reference", "plan_speed", "recorded_positions"]
 
 _CRUISE = 13.9  # m/s, 50 km/h: where a blind accelerating ego stops accelerating without a sign
 
@@ -111,6 +111,18 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
             target = max(v0, float(scene.speed_limit.at(s0)))
         ramp = min(target - v0, scene.horizon)
         return SpeedProfile.from_accelerations(s0, v0, [ramp, max(scene.horizon - ramp, 0.0)], [1.0, 0.0])
+    positions, what = recorded_positions(scene, config)
+    return _fit_positions(scene, positions, what)
+
+
+def recorded_positions(scene: Scene, config: ReferenceConfig) -> tuple[Array, str]:
+    """Centre positions (T, 2) of a recorded reference at the scenario's steps, and what they are of.
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        If there is no such obstacle or file.
+    """
     if config.source == "recorded":
         return _recorded(scene, config.obstacle_id)
     return _from_solution(scene, config.file)
@@ -273,7 +285,7 @@ def _smooth(profile: SpeedProfile, scene: Scene, duration: float) -> UniformBSpl
 # -- recorded --------------------------------------------------------------------------------------
 
 
-def _recorded(scene: Scene, obstacle_id: int | None) -> UniformBSpline:
+def _recorded(scene: Scene, obstacle_id: int | None) -> tuple[Array, str]:
     if obstacle_id is None:
         obstacle = scene.recorded_ego
         if obstacle is None:
@@ -285,10 +297,10 @@ def _recorded(scene: Scene, obstacle_id: int | None) -> UniformBSpline:
         if not found:
             raise ReferenceTrajectoryError(f"{scene.id}: there is no obstacle {obstacle_id} to take the reference from")
         obstacle = found[0]
-    return _fit_positions(scene, obstacle.states[:, :2], f"obstacle {obstacle.id}")
+    return obstacle.states[:, :2], f"obstacle {obstacle.id}"
 
 
-def _from_solution(scene: Scene, file: str | None) -> UniformBSpline:
+def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
     """Reference from a CommonRoad solution file of the same scenario."""
     if not file:
         raise ReferenceTrajectoryError("reference.source is file, but reference.file names no solution file")
@@ -307,7 +319,7 @@ def _from_solution(scene: Scene, file: str | None) -> UniformBSpline:
     matching = [s for s in solution.planning_problem_solutions if s.planning_problem_id == scene.planning_problem_id]
     if not matching:
         raise ReferenceTrajectoryError(f"{path} holds no solution for planning problem {scene.planning_problem_id}")
-    return _fit_positions(scene, _positions(scene, matching[0], path), str(path))
+    return _positions(scene, matching[0], path), str(path)
 
 
 def _positions(scene: Scene, solution: Any, path: Path) -> Array:
@@ -322,10 +334,15 @@ def _positions(scene: Scene, solution: Any, path: Path) -> Array:
     return positions
 
 
+def known_until(positions: Array) -> int:
+    """Number of leading positions (T, 2) without a gap."""
+    known = np.isfinite(positions).all(axis=1)
+    return len(known) if known.all() else int(np.argmin(known))
+
+
 def _fit_positions(scene: Scene, positions: Array, what: str) -> UniformBSpline:
     """Spline through recorded centre positions (T, 2), as far as they go without a gap."""
-    known = np.isfinite(positions).all(axis=1)
-    last = len(known) if known.all() else int(np.argmin(known))
+    last = known_until(positions)
     if last < 4:
         raise ReferenceTrajectoryError(f"{scene.id}: {what} is known for {last} steps only; a reference takes at least 4")
     coordinates = scene.frame.to_frenet(positions[:last])

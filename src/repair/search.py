@@ -103,6 +103,10 @@ def probe_order(rule: str, end: float, delta_t: float) -> Order:
     return _RULES[rule](end, delta_t)
 
 
+class _OutOfTime(Exception):
+    """Ours alone: a TimeoutError may come out of a backend, and would be its bug."""
+
+
 @dataclass
 class _Budget:
     limit: float | None
@@ -181,17 +185,19 @@ def iter_probes(
     budget = _Budget(settings.time_limit, clock(), clock)
     order = probe_order(settings.rule, end, settings.delta_t)
     warm_start: Curve | None = None
-    try:
-        t_rep = next(order)
-        while not budget.spent:
-            probe = _probe(t_rep, source.at(t_rep), backend, checker, settings.sides, warm_start, budget)
-            if probe.feasible:
-                warm_start = probe.solve.curve
-            yield probe
-            t_rep = order.send(probe.feasible)
-    except StopIteration:
-        return
-    raise TimeoutError
+    answer: bool | None = None
+    while True:
+        try:
+            t_rep = next(order) if answer is None else order.send(answer)
+        except StopIteration:
+            return
+        if budget.spent:
+            raise _OutOfTime
+        probe = _probe(t_rep, source.at(t_rep), backend, checker, settings.sides, warm_start, budget)
+        if probe.feasible:
+            warm_start = probe.solve.curve
+        answer = probe.feasible
+        yield probe
 
 
 def search_f_ttr(
@@ -240,7 +246,7 @@ def search_f_ttr(
             probes.append(probe)
             if on_probe is not None:
                 on_probe(probe)
-    except (TimeoutError, KeyboardInterrupt):
+    except (_OutOfTime, KeyboardInterrupt):
         complete = False
     feasible = [p for p in probes if p.feasible]
     wall = clock() - begin

@@ -20,7 +20,7 @@ _KINDS = {
 }
 _PROVENANCE = {
     "official": "official file, sha256 {sha}",
-    "reconstruction": "bundled reconstruction of the paper's Scenario 1, not the official file",
+    "reconstruction": "reconstruction by this project from the paper, not an official file",
     "file": "file {name}, sha256 {sha}",
     "memory": "from memory",
 }

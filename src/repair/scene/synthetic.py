@@ -179,11 +179,20 @@ _WIDTH = 3.5  # measured: width of every lane
 _EGO_SPEED = 3.60  # measured
 _NORTH = 12.85  # measured: x of the northbound lane's centre line, so distance to the corner
 _SOUTH = _NORTH - _WIDTH  # measured 3.51 m beside it
-_EGO_TURN = (0.141, 4.5, 2.5)  # curvature of the ego's left turn (measured), ramps (fitted to the lane)
+# Curvature of the ego's left turn and its ramps. Measured 0.14 to 0.18 1/m, depending on how the
+# lane's polyline is smoothed; with these ramps 0.165 fits the lane.
+_EGO_TURN = (0.165, 6.0, 4.5)
 _WEST_END, _EAST_END, _NORTH_END = 3.4, 19.35, 8.6  # where the junction ends: the turns just fit in
 _APPROACH, _EXIT, _EAST = 40.0, 60.0, 130.0  # assumed: roads long enough for 10 s
-_CAR_TURN = (0.16, 2.0, 5.0)  # assumed: lane from north to east, gentler at its end (as measured)
+_EAST_TURN = (0.16, 2.0, 5.0)  # assumed: lane from north to east, gentler at its end (as measured)
 _KERB_TURN = 1.0 / 4.5  # assumed: right turns, which nobody drives here
+
+# Car 36: all fitted; what was measured follows in brackets.
+_CAR_START = 8.99  # y at the start (8.87) [m]
+_CAR_END = 0.19  # y on the eastern lane at the end (0.1) [m]
+_CAR_TURN = (0.2, 3.08, 11.99)  # a short begin and a long end of the turn (0.15 1/m in its middle)
+# From standstill (2.1 m/s²), in the turn (1.0), out of it (2.1) and on (1.65), to 13.7 m/s (assumed)
+_CAR_PROFILE = ((1.4, 1.94), (0.8, 0.67), (2.0, 2.28), (3.7, 1.6))
 
 
 def _junction() -> list[Any]:
@@ -207,7 +216,7 @@ def _junction() -> list[Any]:
         106: (straight((_EAST, _WIDTH), np.pi, _EAST - e), opposite(105) | {"successor": [115, 116]}),
         111: (_turning((w, 0.0), 0.0, _NORTH - w, n, _quarter_turn(*_EGO_TURN)), {"successor": [103]}),
         112: (straight((w, 0.0), 0.0, e - w), opposite(115) | {"successor": [105]}),
-        113: (_turning((_SOUTH, n), -half, n, e - _SOUTH, _quarter_turn(*_CAR_TURN)), {"successor": [105]}),
+        113: (_turning((_SOUTH, n), -half, n, e - _SOUTH, _quarter_turn(*_EAST_TURN)), {"successor": [105]}),
         114: (_turning((_SOUTH, n), -half, n - _WIDTH, _SOUTH - w, kerb), {"successor": [102]}),
         115: (straight((e, _WIDTH), np.pi, e - w), opposite(112) | {"successor": [102]}),
         116: (_turning((e, _WIDTH), np.pi, e - _NORTH, n - _WIDTH, kerb), {"successor": [103]}),
@@ -237,19 +246,16 @@ def scenario_1() -> tuple[Any, Any]:
         CommonRoad objects; 10 s in steps of 0.1 s. The ego is on the exit lane at the end.
     """
     half = np.pi / 2.0
-    # Car 36 [fitted, measured in brackets]: y = 9.2 (8.9) at the start, 0.45 m (0.1) left of the
-    # centre of the eastern lane at the end, a sharp begin and a long end of the turn (0.15 1/m in the
-    # middle), 1.94 m/s² (2.1) from standstill, 0.66 (1.2) in the turn, 2.34 (2.0) and 1.6 (1.65) out
-    # of it. Assumed: it stops accelerating at 13.8 m/s, about 50 km/h.
-    turn = _quarter_turn(0.19, 1.0, 10.9)
-    crossing = _turning((_SOUTH, 9.2), -half, 9.2 - 0.45, _EAST - _SOUTH, turn)
+    crossing = _turning(
+        (_SOUTH, _CAR_START), -half, _CAR_START - _CAR_END, _EAST - _SOUTH, _quarter_turn(*_CAR_TURN)
+    )
     # Car 333 [measured]: start, 11.7 m driven until it stands; profile of whole seconds fitted to the
     # distances (5.7, 9.0, 10.7, 11.4 m after 1 .. 4 s). Bus 337 [measured]: start; speed and
     # acceleration fitted to 6.6, 13.8, 21.8 m after 1 .. 3 s.
     leader = (_NORTH, 16.3), half, [(40.0, 0.0, 0.0)]
     bus = (13.98, 0.0), 0.0, [(_EAST - 13.98, 0.0, 0.0)]
     obstacles = [
-        _follow(36, "car", (4.75, 1.73), crossing, 0.0, [(1.4, 1.94), (0.8, 0.66), (2.0, 2.34), (3.7, 1.6)]),
+        _follow(36, "car", (4.75, 1.73), crossing, 0.0, _CAR_PROFILE),
         _follow(333, "car", (4.70, 1.69), leader, 7.0,
                 [(1.0, -2.65), (1.0, -2.0), (1.0, -1.35), (1.0, -0.6), (1.0, -0.4)]),
         _follow(337, "bus", (12.14, 2.53), bus, 6.25, [(10.0, 0.7)]),
@@ -272,7 +278,9 @@ class RoadDamage:
         From the ego's centre to the near face of the damage [m]. 31.2 = 15.5 * 1.55 + 8 or so: at
         constant speed the ego enters the box inflated by S_offset = 8.0 m between 1.5 and 1.6 s.
     damage_length, damage_width : float
-        [m]; a broken patch over most of the lane, in its middle.
+        [m]; a broken patch over most of the lane.
+    damage_offset : float
+        Of its middle from the middle of the lane [m], left positive.
     second_gap, second_speed : float
         Car in the second lane: centre ahead of the ego's [m], speed [m/s].
     third_gap, third_speed : float
@@ -292,6 +300,7 @@ class RoadDamage:
     damage_gap: float = 31.2
     damage_length: float = 3.0
     damage_width: float = 2.0
+    damage_offset: float = 0.0
     second_gap: float = 20.0
     second_speed: float = 16.0
     third_gap: float = -18.0
@@ -305,7 +314,7 @@ class RoadDamage:
             if not np.isfinite(value):
                 raise ConfigError(f"RoadDamage.{item.name} is {value!r}; it has to be a finite number")
             may_be_zero = item.name in ("change_start", "speed", "second_speed", "third_speed")
-            if item.name not in ("second_gap", "third_gap") and (value < 0.0 or (value == 0.0 and not may_be_zero)):
+            if item.name not in ("second_gap", "third_gap", "damage_offset") and (value < 0.0 or (value == 0.0 and not may_be_zero)):
                 raise ConfigError(f"RoadDamage.{item.name} is {value!r}; it has to be positive")
         for name, least in (("damage_gap", 5.0), ("lane_width", 2.5)):  # else vehicles overlap at t = 0
             if getattr(self, name) < least:
@@ -346,7 +355,7 @@ def scenario_2(damage: RoadDamage | None = None) -> tuple[Any, Any]:
     t = np.arange(_STEPS + 1) * _DT
     patch = StaticObstacle(
         1, ObstacleType.CONSTRUCTION_ZONE, Rectangle(length=p.damage_length, width=p.damage_width),
-        InitialState(time_step=0, position=np.array([p.damage_gap + p.damage_length / 2.0, 0.0]), orientation=0.0,
+        InitialState(time_step=0, position=np.array([p.damage_gap + p.damage_length / 2.0, p.damage_offset]), orientation=0.0,
                      velocity=0.0, acceleration=0.0, yaw_rate=0.0, slip_angle=0.0),
     )  # fmt: skip
     tau = np.clip((t - p.change_start) / p.change_duration, 0.0, 1.0)

@@ -21,15 +21,15 @@ own solution until the exact values agree.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from repair.bspline import UniformBSpline, fit_to_curve, n_points_for, splice_points
 from repair.config import CasadiConfig, Config
 from repair.errors import BackendError
-from repair.solvers.nlp_model import Model, Solution, Structure, build_model
-from repair.solvers.separation import NOBODY, Separation, Windows, road_room, separate
+from repair.solvers.nlp_model import Model, Structure, build_model
+from repair.solvers.separation import Separation, Windows, road_room, separate
 from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, SolveResult, SolveStatus, frozen
 
 __all__ = ["CasadiBackend", "make"]
@@ -146,6 +146,8 @@ class CasadiBackend:
             solver=c.solver,
             max_iterations=c.max_iterations,
             tolerance=c.tolerance,
+            tangent=float(np.tan(c.heading)),
+            presolve=c.presolve,
             timed=timed,
         )
 
@@ -207,43 +209,37 @@ class CasadiBackend:
         self, instance: _Instance, points: Array, deadline: float | None, time_limit: float | None
     ) -> SolveResult:
         """Solve around the guide, then around the solution, until the exact constraints are kept."""
-        problem, model = instance.problem, instance.model
-        iterations, room = 0, None
-        why = _start_violation(instance, self.config.heading)
+        why = _start_violation(instance)
         if why:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+        iterations, room = 0, None
         for _ in range(self.config.rounds):
             room = _room(instance, points, room)
             separation = self._separate(instance, points, room)
             why = separation.why or _gap(separation)
             if why:
                 return SolveResult(SolveStatus.INFEASIBLE, iterations=iterations, detail=why)
-            solution = self._run(instance, separation, points, deadline)
-            iterations += solution.iterations
-            residuals = self._residuals(instance, separation, solution.points)
-            worst = max(residuals.values())
-            status = _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
-            if status is not SolveStatus.SOLVED or worst <= TOLERANCE:
+            points, status, word, count = self._run(instance, separation, points, deadline)
+            iterations += count
+            residuals = self._residuals(instance, separation, points)
+            kept = max(residuals.values()) <= TOLERANCE
+            if status is not SolveStatus.SOLVED or kept:
                 break
-            points = solution.points
             if deadline is not None and time.perf_counter() > deadline:
                 status = SolveStatus.TIME_LIMIT
                 break
-        detail = solution.word
-        if status is SolveStatus.SOLVED and worst > TOLERANCE:
-            status = SolveStatus.NUMERICAL_ERROR
-            detail = f"{_worst(residuals)} after {self.config.rounds} rounds"
+        detail = word
+        if status is SolveStatus.SOLVED and not kept:
+            status, detail = SolveStatus.NUMERICAL_ERROR, f"{_worst(residuals)} after {self.config.rounds} rounds"
         elif status is SolveStatus.TIME_LIMIT and time_limit is not None:
             detail = f"time limit of {time_limit:g} s"
-        elif status is not SolveStatus.SOLVED:
-            detail = f"{solution.word}; at the last iterate {_worst(residuals)}"
+        elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
+            detail = f"{word}; at the last iterate {_worst(residuals)}"
         curve = None
-        if status is SolveStatus.SOLVED:
-            final = solution.points + instance.origin
-            curve = UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(final))
-        return SolveResult(
-            status, curve, self._objective(instance, solution.points), iterations, detail=detail, residuals=residuals
-        )
+        if kept and status is not SolveStatus.INFEASIBLE:
+            curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, frozen(points + instance.origin))
+        objective = self._objective(instance, points)
+        return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
     def _separate(
         self, instance: _Instance, points: Array, room: tuple[Array, Array] | None
@@ -252,28 +248,64 @@ class CasadiBackend:
         shape = (model.obstacle @ points)[windows.row] + instance.origin
         return separate(problem, windows, len(model.obstacle), shape, room, problem.occupancy.ids)
 
-    def _run(self, instance: _Instance, separation: Separation, points: Array, deadline: float | None) -> Solution:
-        model, p = instance.model, self.degree
+    def _run(
+        self, instance: _Instance, separation: Separation, points: Array, deadline: float | None
+    ) -> tuple[Array, SolveStatus, str, int]:
+        """One NLP: the new control points, the status, the solver's word, the iterations."""
+        model = instance.model
+        low, high = self._bounds(instance, separation)
+        slope = self._slope(instance)
+        x0 = model.unknowns(points)
+        if model.structure.presolve:
+            x0, feasible = model.presolve(x0, slope, low, high)
+            if feasible is False:
+                return points, SolveStatus.INFEASIBLE, self._conflict(instance, separation, points, slope), 0
+        points = model.with_unknowns(points, x0)
+        data = self._sample_data(instance, points)
+        solution = model.solve(x0, data, slope, low, high, deadline)
+        status, word = _status(model, solution.word), solution.word
+        if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
+            # An SQP that does not converge proves nothing; IPOPT has the last word.
+            oracle = build_model(replace(model.structure, solver="ipopt"))
+            solution = oracle.solve(x0, data, slope, low, high, deadline)
+            status, word = _status(oracle, solution.word), f"{word}, then IPOPT: {solution.word}"
+        return model.with_unknowns(points, solution.x), status, word, solution.iterations
+
+    def _bounds(self, instance: _Instance, separation: Separation) -> tuple[Array, Array]:
+        """Bounds of all rows of the model, taken in by the solver's own tolerance."""
+        model = instance.model
         lower, upper = list(instance.lower), list(instance.upper)
         for k, rows in enumerate(model.linear):
             if rows.family == "obstacles":
                 shift = instance.origin[rows.axis]
                 lower[k] = separation.lower[:, rows.axis] - shift
                 upper[k] = separation.upper[:, rows.axis] - shift
-        lower = [b + _TIGHTEN for b in lower]
-        upper = [b - _TIGHTEN for b in upper]
-        return model.solve(
-            instance.head, points[p:], self._sample_data(instance, points), self._slope(instance),
-            float(np.tan(self.config.heading)), lower, upper, deadline,
-        )  # fmt: skip
+        low, high = model.bounds(instance.head, lower, upper)
+        return low + _TIGHTEN, high - _TIGHTEN
+
+    def _conflict(self, instance: _Instance, separation: Separation, points: Array, slope: Array) -> str:
+        """Which obstacle it is that the limits leave no way around: the first that a free curve hits."""
+        model = instance.model
+        nobody = np.full_like(separation.lower, _INF)
+        free = replace(separation, lower=-nobody, upper=nobody)
+        x, feasible = model.presolve(model.unknowns(points), slope, *self._bounds(instance, free))
+        if feasible is not True:
+            return "no curve from the start state keeps the limits of speed, acceleration and jerk"
+        position = model.obstacle @ model.with_unknowns(points, x) + instance.origin
+        depth = np.stack([separation.lower - position, position - separation.upper])
+        worst = np.max(depth, axis=(0, 2))
+        row = int(np.argmin(np.where(worst > _TIGHTEN, separation.times, _INF)))
+        end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
+        who = (separation.lower_by, separation.upper_by)[int(end)][row, axis]
+        return f"no curve within the limits keeps clear of {separation.who(who)} (t = {separation.times[row]:.2f} s)"
 
     def _slope(self, instance: _Instance) -> Array:
-        """Linear part of the objective (n, axes): pull towards the reference, and the given points."""
+        """Linear part of the objective (m,): pull towards the reference, and the given points."""
         model, problem = instance.model, instance.problem
         p, axes = self.degree, model.structure.axes
         wanted = problem.reference.sample(problem.t_rep + model.gauss_tau).position - instance.origin
-        slope = model.hessian[:, :p] @ instance.head - model.pull @ wanted
-        return np.asarray(slope[:, :axes])
+        slope = model.hessian[p:, :p] @ instance.head - model.pull[p:] @ wanted
+        return np.asarray(slope[:, :axes].T.ravel())
 
     def _sample_data(self, instance: _Instance, points: Array) -> Array:
         """What the nonlinear rows need to know: the given points' share, and the axis' curvature."""
@@ -315,6 +347,12 @@ class CasadiBackend:
             found["road"] = _road_violation(instance, points)
         found |= _plane_violations(instance, points)
         return found
+
+
+def _status(model: Model, word: str) -> SolveStatus:
+    if model.structure.solver == "sqpmethod" and word == "Search_Direction_Becomes_Too_Small":
+        return SolveStatus.SOLVED  # the QP's step is nil: a stationary point, whose residuals decide
+    return _STATUS.get(word, SolveStatus.NUMERICAL_ERROR)
 
 
 def _require(problem: RepairProblem) -> None:
@@ -364,7 +402,7 @@ def _gap(separation: Separation) -> str:
     return f"{separation.who(below)} and {separation.who(above)} leave no gap at t = {t:.2f} s"
 
 
-def _start_violation(instance: _Instance, heading: float) -> str:
+def _start_violation(instance: _Instance) -> str:
     """The first limit that the given state itself breaks, as a sentence."""
     problem, limits = instance.problem, instance.problem.limits
     (s, l), (v, w), (a, b) = problem.start  # noqa: E741

@@ -32,6 +32,7 @@ __all__ = ["SAMPLED", "Model", "Solution", "Structure", "bernstein_rows", "build
 SAMPLED = 8
 # Added to the squared speed [m²/s²] where the path's curvature divides by it.
 _STANDSTILL = 0.01
+_DAQP_INFEASIBLE = -1
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,10 @@ class Structure:
         ``ipopt`` or ``sqpmethod``.
     max_iterations : int
     tolerance : float
+    tangent : float
+        Largest l' / s'.
+    presolve : bool
+        Make the QP of the linear rows as well.
     timed : bool
         The solver asks after every iteration whether there is time left.
     """
@@ -71,6 +76,8 @@ class Structure:
     solver: str
     max_iterations: int
     tolerance: float
+    tangent: float
+    presolve: bool = True
     timed: bool = False
 
     @property
@@ -145,16 +152,15 @@ class Solution:
 
     Attributes
     ----------
-    points : (n, 2) array
+    x : (m,) array
+        The unknowns.
     word : str
-        The solver's return status, or the first line of what it threw.
-    success : bool
+        The solver's return status, or the last line of what it threw.
     iterations : int
     """
 
-    points: Array
+    x: Array
     word: str
-    success: bool
     iterations: int
 
 
@@ -246,24 +252,31 @@ class Model:
         count = len(self.tau)
         data = ca.SX.sym("data", count, SAMPLED)
         slope = ca.SX.sym("slope", m * s.axes)
-        tangent = ca.SX.sym("tangent")
         hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
         objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        self._kept: list[tuple[np.ndarray, ...]] = []
-        g = []
-        for rows in self._linear:
-            keep = np.abs(rows.matrix[:, p:]).max(axis=1) > 1e-12
-            self._kept.append((np.flatnonzero(keep),))
-            g.append(ca.mtimes(_sparse(rows.matrix[keep][:, p:]), axes[rows.axis]))
-        if s.lateral:
-            free = _sparse(self.velocity[self._kept[0][0]][:, p:])
-            along, across = ca.mtimes(free, axes[0]), ca.mtimes(free, axes[1])
-            g += [tangent * along - across, tangent * along + across]
-        g += self._nonlinear(axes, data)
-        parameters = ca.vertcat(ca.vec(data), slope, tangent)
-        nlp = {"x": x, "p": parameters, "f": objective, "g": ca.vertcat(*g)}
+        self._kept = [np.flatnonzero(np.abs(rows.matrix[:, p:]).max(axis=1) > 1e-12) for rows in self._linear]
+        matrix = _sparse(self._free_matrix())
+        g = [ca.mtimes(matrix, x), *self._nonlinear(axes, data)]
+        nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": ca.vertcat(*g)}
         self._function = self._make_solver(nlp)
+        shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
+        self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False}) if s.presolve else None
+        self._qp_data = {"h": hessian, "a": matrix}
+
+    def _free_matrix(self) -> Array:
+        """All linear rows that the unknowns can move, over the unknowns; the direction of travel last."""
+        s, p = self.structure, self.structure.degree
+        m = s.n - p
+        blocks = []
+        for rows, kept in zip(self._linear, self._kept, strict=True):
+            block = np.zeros((len(kept), m * s.axes))
+            block[:, rows.axis * m : (rows.axis + 1) * m] = rows.matrix[kept][:, p:]
+            blocks.append(block)
+        if s.lateral:
+            free = self.velocity[self._kept[0]][:, p:]
+            blocks += [np.hstack([s.tangent * free, sign * free]) for sign in (-1.0, 1.0)]
+        return np.vstack(blocks)
 
     def _nonlinear(self, axes: list[Any], data: Any) -> list[Any]:
         """Accelerations and curvature of the driven path at the samples.
@@ -314,71 +327,89 @@ class Model:
         try:
             return ca.nlpsol("repair", s.solver, nlp, options)
         except RuntimeError as error:
-            raise BackendError(f"CasADi cannot make the solver {s.solver!r}: {_first_line(error)}") from error
+            raise BackendError(f"CasADi cannot make the solver {s.solver!r}: {_last_line(error)}") from error
+
+    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array, bool | None]:
+        """The convex QP of the objective and the linear rows alone.
+
+        Returns
+        -------
+        x : array
+            Its solution, or ``x0`` where it has none.
+        feasible : bool or None
+            False if the linear rows contradict each other: then so does the NLP. None if daqp failed.
+        """
+        rows = self._qp_data["a"].shape[0]
+        out = self._qp(**self._qp_data, g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
+        word = int(self._qp.stats()["return_status"])
+        if word > 0:
+            return np.asarray(out["x"]).ravel(), True
+        return x0, False if word == _DAQP_INFEASIBLE else None
 
     def solve(
-        self,
-        head: Array,
-        tail: Array,
-        data: Array,
-        slope: Array,
-        tangent: float,
-        lower: list[Array],
-        upper: list[Array],
-        deadline: float | None,
+        self, x0: Array, data: Array, slope: Array, low: Array, high: Array, deadline: float | None
     ) -> Solution:
         """Run the solver.
 
         Parameters
         ----------
-        head, tail : (p, 2), (n - p, 2) array
-            Given control points; initial guess of the others.
+        x0 : (m,) array
+            Initial guess of the unknowns.
         data : (S, 8) array
             See :data:`SAMPLED`.
-        slope : (n, axes) array
+        slope : (m,) array
             Linear part of the objective.
-        tangent : float
-            Largest l' / s'.
-        lower, upper : list of arrays
-            Bounds of all rows: those of :attr:`linear` in order, then the nonlinear ones.
+        low, high : (R,) array
+            Bounds of all rows, see :meth:`bounds`.
+        deadline : float or None
+            ``time.perf_counter()`` at which to stop; needs ``timed``.
         """
-        s, p = self.structure, self.structure.degree
-        low, high = self._free_bounds(head, lower, upper, tangent)
-        x0 = tail[:, : s.axes].T.ravel()
-        parameters = np.concatenate([data.T.ravel(), slope[p:].T.ravel(), [tangent]])
         if self._deadline is not None:
             self._deadline.at = deadline if deadline is not None else float("inf")
         try:
-            out = self._function(x0=x0, p=parameters, lbg=low, ubg=high)
-            x = np.asarray(out["x"]).reshape(s.axes, -1).T
-            stats = self._function.stats()
-            word, success = str(stats["return_status"]), bool(stats["success"])
-            iterations = int(stats.get("iter_count", 0))
+            out = self._function(x0=x0, p=np.concatenate([data.T.ravel(), slope]), lbg=low, ubg=high)
         except RuntimeError as error:
-            x, word, success, iterations = tail[:, : s.axes], _first_line(error), False, 0
-        points = np.vstack([head, tail])
-        points[p:, : s.axes] = x
-        return Solution(points, word, success, iterations)
+            return Solution(x0, _last_line(error), 0)
+        try:
+            stats = self._function.stats()
+        except RuntimeError:  # sqpmethod has no word for a QP that fails
+            return Solution(np.asarray(out["x"]).ravel(), "QP_Failed", 0)
+        return Solution(
+            np.asarray(out["x"]).ravel(), str(stats["return_status"]), int(stats.get("iter_count", 0))
+        )
 
-    def _free_bounds(
-        self, head: Array, lower: list[Array], upper: list[Array], tangent: float
-    ) -> tuple[Array, Array]:
-        """Bounds of the rows that the unknowns can move, with the given points' share taken off."""
-        p = self.structure.degree
+    def bounds(self, head: Array, lower: list[Array], upper: list[Array]) -> tuple[Array, Array]:
+        """Bounds of the rows that the unknowns can move, the given points' share taken off.
+
+        Parameters
+        ----------
+        head : (p, 2) array
+            The given control points.
+        lower, upper : list of arrays
+            Of the rows of :attr:`linear` in order, then of the nonlinear ones.
+        """
+        p, count = self.structure.degree, len(self._linear)
         low, high = [], []
-        count = len(self._linear)
-        for rows, (kept,), below, above in zip(self._linear, self._kept, lower, upper, strict=False):
+        for rows, kept, below, above in zip(self._linear, self._kept, lower, upper, strict=False):
             share = rows.matrix[kept][:, :p] @ head[:, rows.axis]
             low.append(below[kept] - share)
             high.append(above[kept] - share)
         if self.structure.lateral:
-            given = self.velocity[self._kept[0][0]][:, :p] @ head
+            given = self.velocity[self._kept[0]][:, :p] @ head
             for sign in (-1.0, 1.0):
-                low.append(-(tangent * given[:, 0] + sign * given[:, 1]))
+                low.append(-(self.structure.tangent * given[:, 0] + sign * given[:, 1]))
                 high.append(np.full(len(given), np.inf))
-        low += lower[count:]
-        high += upper[count:]
-        return np.concatenate(low), np.concatenate(high)
+        return np.concatenate(low + lower[count:]), np.concatenate(high + upper[count:])
+
+    def unknowns(self, points: Array) -> Array:
+        """The unknowns (m,) among control points (n, 2)."""
+        return points[self.structure.degree :, : self.structure.axes].T.ravel()
+
+    def with_unknowns(self, points: Array, x: Array) -> Array:
+        """Control points (n, 2) with the unknowns set."""
+        changed = points.copy()
+        changed[self.structure.degree :, : self.structure.axes] = x.reshape(self.structure.axes, -1).T
+        return changed
 
 
 class _Deadline:
@@ -429,7 +460,7 @@ def _sparse(matrix: Array) -> Any:
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
 
 
-def _first_line(error: Exception) -> str:
+def _last_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__
 

@@ -183,7 +183,6 @@ def _obstacles(
     if problem.lateral:
         assert room is not None
         right, left = room
-        beside = (-cover[..., 3].max(axis=2) + 0.0 >= np.inf) | False
         # Out of the road's reach: the road's own bounds keep the curve off.
         low_edge, high_edge = -cover[..., 3].max(axis=2), cover[..., 2].max(axis=2)
         beside = (low_edge - margin >= left) | (high_edge + margin <= right)

@@ -1,0 +1,90 @@
+"""A scene whose frame runs along a recorded path instead of the planned lead-in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.scene.bounds import crossings, lateral_bounds
+from repair.scene.frame import FrenetFrame
+from repair.scene.route import lanes_of
+from repair.types import Array, frozen
+
+if TYPE_CHECKING:
+    from repair.scene.commonroad import Scene
+
+__all__ = ["as_ego", "reframe"]
+
+_SPACING = 0.5  # recorded points closer than this [m] are noise to a path
+_JOIN = 15.0  # length over which the recorded path runs into the route again [m]
+
+
+def reframe(scene: Scene, positions: Array) -> Scene:
+    """Lay the frame along recorded centre positions (T, 2), then on along the old frame.
+
+    A reference that changes lanes then has l = 0 like any other, so that it can be followed more
+    slowly without leaving its path.
+    """
+    path = [positions[0]]
+    for point in positions[1:]:
+        if np.hypot(*(point - path[-1])) >= _SPACING:
+            path.append(point)
+    recorded = np.array(path)
+    if len(recorded) < 4:
+        return scene
+    old = scene.frame
+    s_end, l_end = old.to_frenet(recorded[-1:])[0]
+    if np.isfinite(s_end):
+        ahead = np.arange(_SPACING, max(old.length - s_end, _SPACING * 2), 1.0)
+        share = np.clip(ahead / _JOIN, 0.0, 1.0)
+        offset = l_end * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
+        following = old.to_cartesian(s_end + ahead, offset)
+    else:
+        direction = recorded[-1] - recorded[-2]
+        following = recorded[-1] + np.arange(1.0, 40.0)[:, None] * direction / np.hypot(*direction)
+    direction = recorded[1] - recorded[0]
+    back = np.arange(30.0, 0.0, -1.0)[:, None]
+    behind = recorded[0] - back * direction / np.hypot(*direction)
+    frame = FrenetFrame.from_points(np.concatenate([behind, recorded, following]), smoothing=0.1)
+    s0, l0 = frame.to_frenet(positions[:1], near=np.array([30.0]))[0]
+    speed, acceleration = scene.start[1, 0], scene.start[2, 0]
+    lanes, _ = lanes_of(scene.scenario.lanelet_network)
+    found = crossings(frame, lanes)
+    half = 0.5 * scene.vehicle.width
+    return replace(
+        scene,
+        frame=frame,
+        start=frozen([[s0, l0], [speed, 0.0], [acceleration, 0.0]]),
+        route_end_s=frame.length,
+        goal_s=None,
+        lane=lateral_bounds(found, half, lanelets=scene.route_lanelets),
+        same_direction=lateral_bounds(found, half, lanelets=scene.route_lanelets, same_direction=True),
+        road=lateral_bounds(found, half),
+        speed_limit=None,
+        notes=(*scene.notes, "the frame runs along the recorded reference"),
+    )
+
+
+def as_ego(scene: Scene, obstacle_id: int) -> Scene:
+    """Let a recorded obstacle be the ego: it leaves the traffic, and the scene starts with its state.
+
+    An obstacle with unknown id is left to whoever asks for its trajectory.
+    """
+    chosen = [o for o in scene.obstacles if o.id == obstacle_id]
+    if not chosen:
+        return scene
+    x, y, heading, speed = (float(v) for v in chosen[0].states[0])
+    speed = speed if np.isfinite(speed) else 0.0
+    start = scene.start.copy()
+    start[1, 0], start[2, 0] = speed, 0.0
+    return replace(
+        scene,
+        obstacles=tuple(o for o in scene.obstacles if o.id != obstacle_id),
+        start=frozen(start),
+        initial_state=replace(
+            scene.initial_state, x=x, y=y, orientation=heading, velocity=speed, acceleration=0.0, yaw_rate=0.0
+        ),
+        notes=(*scene.notes, f"obstacle {obstacle_id} is taken as the ego and leaves the traffic"),
+    )

@@ -1,0 +1,473 @@
+"""Algorithm 1 on problems without content: what is visited, what is returned, how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from repair.config import Config, SearchConfig
+from repair.search import probe_order, search_f_ttr
+from repair.solvers import registry
+from repair.types import (
+    Conflict,
+    Maneuver,
+    Passing,
+    Reason,
+    SearchStatus,
+    SolveResult,
+    SolveStatus,
+    Verdict,
+    Violation,
+)
+from tests import toy
+
+
+@dataclass
+class FakeSource:
+    """One problem for each manoeuvre at every t_rep."""
+
+    maneuvers: tuple[Maneuver | None, ...] = (Maneuver.YIELD,)
+    asked: list[float] = field(default_factory=list)
+
+    def at(self, t_rep):
+        self.asked.append(t_rep)
+        return tuple(toy.problem((), t_rep=t_rep, t_end=t_rep + 2.0, passing=self.passing(m)) for m in self.maneuvers)
+
+    @staticmethod
+    def passing(maneuver):
+        if maneuver is None:
+            return None
+        return Passing(maneuver, toy.constant().sample(np.arange(3.0)), np.zeros((0, 3), dtype=np.int8), 0.0)
+
+
+@dataclass
+class FakeBackend:
+    """Answers with the reference; its objective may depend on the manoeuvre."""
+
+    name: str = "fake"
+    costs: dict[Maneuver, float] = field(default_factory=dict)
+    status: SolveStatus = SolveStatus.SOLVED
+    on_solve: object = None
+    limits: list[float | None] = field(default_factory=list)
+    warm: list[object] = field(default_factory=list)
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        self.limits.append(time_limit)
+        self.warm.append(warm_start)
+        if self.on_solve is not None:
+            self.on_solve()
+        if self.status is not SolveStatus.SOLVED:
+            return SolveResult(self.status)
+        maneuver = problem.passing.maneuver if problem.passing else None
+        return SolveResult(self.status, curve=toy.constant(10.0), objective=self.costs.get(maneuver, 0.0))
+
+
+@dataclass
+class FakeChecker:
+    """Says yes where ``yes(problem)`` does."""
+
+    yes: object
+
+    def check(self, problem, curve):
+        return Verdict() if self.yes(problem) else Verdict((Violation(Reason.COLLISION, problem.t_rep + 0.3),))
+
+
+class BentClock:
+    """Time that passes only where the test lets it."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def tick(self, seconds):
+        self.now += seconds
+
+
+def until(latest):
+    return FakeChecker(lambda problem: problem.t_rep <= latest + 1e-9)
+
+
+def search(checker, ttc=2.9, *, backend=None, source=None, on_probe=None, clock=None, conflict=None, **settings):
+    keys = {"on_probe": on_probe} | ({"clock": clock} if clock else {})
+    return search_f_ttr(
+        source or FakeSource(), conflict or Conflict(ttc, "margin", 7, ttc + 0.05), backend or FakeBackend(), checker,
+        SearchConfig(**settings), **keys,
+    )  # fmt: skip
+
+
+def visited(result):
+    return [probe.t_rep for probe in result.probes]
+
+
+# -- orders ------------------------------------------------------------------------------------------
+
+
+def test_bisect_visits_the_papers_iterates_of_scenario_1():
+    result = search(until(9.0), 2.9, rule="bisect", delta_t=0.4, upper=2.0)
+    assert visited(result) == pytest.approx([0.0, 0.8, 1.2, 1.6])
+    assert result.f_ttr == pytest.approx(1.6)
+
+
+def test_bisect_visits_the_papers_iterates_of_scenario_2():
+    result = search(until(0.8), 1.6, rule="bisect", delta_t=0.4)
+    assert visited(result) == pytest.approx([0.0, 0.8, 1.2])
+    assert result.f_ttr == pytest.approx(0.8)
+
+
+def test_without_an_upper_end_scenario_1_has_the_same_answer():
+    result = search(until(1.6), 2.9, rule="bisect", delta_t=0.4)
+    assert result.f_ttr == pytest.approx(1.6)
+
+
+def test_as_printed_visits_what_the_listing_would():
+    yes_no = search(until(1.6), 2.9, rule="as_printed", delta_t=0.4)
+    # 0 yes, 1.45 yes, 2.175 no, 1.8125 no: the interval 1.45 .. 1.8125 is then below 0.4
+    assert visited(yes_no) == pytest.approx([0.0, 1.45, 2.175, 1.8125])
+    assert yes_no.f_ttr == pytest.approx(1.45)  # not the midpoint 1.63, which nobody tested
+    all_yes = search(until(9.0), 2.9, rule="as_printed", delta_t=0.4)
+    assert visited(all_yes) == pytest.approx([0.0, 1.45, 2.175, 2.5375])
+
+
+def test_as_printed_ends_where_nothing_is_feasible():
+    result = search(until(-1.0), 2.9, rule="as_printed", delta_t=0.4)
+    assert visited(result) == [0.0]
+    assert result.status is SearchStatus.NONE_FEASIBLE
+
+
+@pytest.mark.parametrize("rule", ["bisect", "scan", "as_printed"])
+@pytest.mark.parametrize("delta_t", [0.1, 0.3, 0.4, 0.7])
+@pytest.mark.parametrize("ttc", [0.05, 0.4, 0.8, 1.2, 2.4, 2.8, 2.9, 2.9000000000000004, 6.000000000000001])
+def test_no_rule_reaches_the_conflict_or_asks_twice(rule, delta_t, ttc):
+    for latest in (-1.0, 0.0, 0.55 * ttc, 99.0):
+        result = search(until(latest), ttc, rule=rule, delta_t=delta_t)
+        times = visited(result)
+        assert all(0.0 <= t < ttc - 1e-9 for t in times)
+        assert len({round(t, 9) for t in times}) == len(times)
+        if result.f_ttr is not None:
+            assert any(abs(p.t_rep - result.f_ttr) < 1e-12 and p.feasible for p in result.probes)
+
+
+@pytest.mark.parametrize("delta_t", [0.1, 0.2, 0.3, 0.4, 0.7])
+@pytest.mark.parametrize("steps", [1, 2, 3, 4, 7, 12, 29])
+def test_the_grid_does_not_depend_on_rounding(delta_t, steps):
+    """k * delta_t is outside of [0, k * delta_t) however the product was rounded."""
+    for ttc in (steps * delta_t, np.nextafter(steps * delta_t, 0.0), np.nextafter(steps * delta_t, 99.0), sum([delta_t] * steps)):
+        assert visited(search(until(99.0), ttc, rule="scan", delta_t=delta_t)) == pytest.approx(
+            [k * delta_t for k in range(steps)]
+        )
+        best = search(until(99.0), ttc, rule="bisect", delta_t=delta_t)
+        assert best.f_ttr == pytest.approx((steps - 1) * delta_t)
+
+
+@pytest.mark.parametrize("delta_t", [0.1, 0.4])
+@pytest.mark.parametrize("latest", [0.0, 0.3, 0.8, 1.25, 2.8])
+def test_bisect_finds_what_scan_finds_where_feasibility_is_contiguous(delta_t, latest):
+    bisect, scan = (search(until(latest), 2.9, rule=rule, delta_t=delta_t) for rule in ("bisect", "scan"))
+    assert bisect.f_ttr == pytest.approx(scan.f_ttr)
+    assert len(bisect.probes) <= np.ceil(np.log2(2.9 / delta_t)) + 2
+    assert len(scan.probes) == np.ceil(2.9 / delta_t)
+
+
+def test_probe_order_is_a_generator_that_is_told_the_answers():
+    order = probe_order("bisect", 1.6, 0.4)
+    assert next(order) == 0.0
+    assert order.send(True) == pytest.approx(0.8)
+    assert order.send(False) == pytest.approx(0.4)
+    with pytest.raises(StopIteration):
+        order.send(True)
+
+
+# -- answers -----------------------------------------------------------------------------------------
+
+
+def test_non_monotone_feasibility_is_seen_by_scan():
+    island = FakeChecker(lambda problem: problem.t_rep < 0.5 or 1.9 < problem.t_rep < 2.1)
+    assert search(island, 2.9, rule="bisect", delta_t=0.4).f_ttr == pytest.approx(0.4)
+    scan = search(island, 2.9, rule="scan", delta_t=0.4)
+    assert scan.f_ttr == pytest.approx(2.0)
+    feasible = [p.feasible for p in scan.probes]
+    assert sum(a != b for a, b in pairwise(feasible)) == 3
+
+
+def test_scan_goes_on_where_now_is_infeasible():
+    later = FakeChecker(lambda problem: problem.t_rep > 0.9)
+    assert search(later, 2.9, rule="bisect", delta_t=0.4).status is SearchStatus.NONE_FEASIBLE
+    assert search(later, 2.9, rule="scan", delta_t=0.4).f_ttr == pytest.approx(2.8)
+
+
+def test_result_is_the_last_verified_probe_with_its_curve():
+    result = search(until(1.3), 2.9, rule="bisect", delta_t=0.4)
+    assert result.status is SearchStatus.FOUND
+    assert result.best is not None
+    assert result.best.t_rep == result.f_ttr == pytest.approx(1.2)
+    assert result.curve is result.best.solve.curve
+    assert result.complete
+    assert list(result) == list(result.probes)
+
+
+def test_no_conflict_asks_nobody():
+    source = FakeSource()
+    result = search(until(9.0), source=source, conflict=Conflict(float("inf")))
+    assert result.status is SearchStatus.NO_CONFLICT
+    assert result.f_ttr == float("inf")
+    assert result.curve is None
+    assert source.asked == []
+
+
+def test_contact_at_the_start_is_its_own_answer():
+    source = FakeSource()
+    result = search(until(9.0), source=source, conflict=Conflict(0.0, "collision", 3, 0.0, 3))
+    assert result.status is SearchStatus.ALREADY_COLLIDING
+    assert result.f_ttr == 0.0
+    assert source.asked == []
+
+
+def test_a_margin_violated_at_the_start_leaves_zero_as_the_only_candidate():
+    result = search(until(9.0), conflict=Conflict(0.0, "margin", 3, float("inf")), rule="bisect", delta_t=0.4)
+    assert visited(result) == [0.0]
+    assert result.f_ttr == 0.0
+    assert result.status is SearchStatus.FOUND
+
+
+@pytest.mark.parametrize("rule", ["bisect", "scan", "as_printed"])
+def test_nothing_feasible_is_none_and_not_zero(rule):
+    result = search(until(-1.0), 2.9, rule=rule)
+    assert result.status is SearchStatus.NONE_FEASIBLE
+    assert result.f_ttr is None
+    assert result.curve is None
+    assert result.complete
+    assert result.probes
+
+
+def test_upper_end_zero_tests_now_only():
+    assert visited(search(until(9.0), 2.9, upper=0.0)) == [0.0]
+
+
+def test_no_open_manoeuvre_is_a_verdict():
+    result = search(until(9.0), source=FakeSource(()))
+    assert result.status is SearchStatus.NONE_FEASIBLE
+    assert result.probes[0].verdict.reasons == (Reason.NO_PASSAGE.value,)
+
+
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [(SolveStatus.INFEASIBLE, Reason.NOT_SOLVED), (SolveStatus.NO_CORRIDOR, Reason.NO_CORRIDOR),
+     (SolveStatus.NUMERICAL_ERROR, Reason.NOT_SOLVED)],
+)  # fmt: skip
+def test_what_the_solver_could_not_do_is_not_the_checkers_no(status, reason):
+    result = search(until(9.0), backend=FakeBackend(status=status))
+    probe = result.probes[0]
+    assert not probe.feasible
+    assert probe.verdict.reasons == (reason.value,)
+    assert probe.verdict.violations[0].detail
+
+
+# -- sides -------------------------------------------------------------------------------------------
+
+BOTH = (Maneuver.YIELD, Maneuver.LEFT, Maneuver.GO_AHEAD)
+
+
+def test_best_keeps_the_cheapest_feasible_side():
+    backend = FakeBackend(costs={Maneuver.YIELD: 5.0, Maneuver.LEFT: 2.0, Maneuver.GO_AHEAD: 1.0})
+    checker = FakeChecker(lambda problem: problem.passing.maneuver is not Maneuver.GO_AHEAD)
+    result = search(checker, source=FakeSource(BOTH), backend=backend, upper=0.0, sides="best")
+    probe = result.probes[0]
+    assert probe.maneuver is Maneuver.LEFT
+    assert probe.solve.objective == 2.0
+    assert probe.tried == ("yield: feasible", "left: feasible", "go_ahead: collision")
+
+
+def test_first_stops_at_the_first_feasible_side():
+    backend = FakeBackend(costs={Maneuver.YIELD: 5.0, Maneuver.LEFT: 2.0})
+    result = search(until(9.0), source=FakeSource(BOTH), backend=backend, upper=0.0, sides="first")
+    assert result.probes[0].maneuver is Maneuver.YIELD
+    assert len(backend.limits) == 1
+
+
+def test_of_failures_the_first_is_kept():
+    result = search(until(-1.0), source=FakeSource(BOTH), sides="best")
+    assert result.probes[0].maneuver is Maneuver.YIELD
+    assert len(result.probes[0].tried) == 3
+
+
+def test_a_nan_objective_does_not_beat_a_number():
+    backend = FakeBackend(costs={Maneuver.YIELD: 5.0, Maneuver.LEFT: float("nan")})
+    result = search(until(9.0), source=FakeSource(BOTH[:2]), backend=backend, upper=0.0)
+    assert result.probes[0].maneuver is Maneuver.YIELD
+
+
+# -- anytime -----------------------------------------------------------------------------------------
+
+
+def test_time_limit_keeps_what_was_verified():
+    clock = BentClock()
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    result = search(until(9.0), 2.9, backend=backend, clock=clock, rule="scan", delta_t=0.1, time_limit=3.5)
+    assert visited(result) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert result.status is SearchStatus.FOUND
+    assert result.f_ttr == pytest.approx(0.3)
+    assert not result.complete
+    assert result.wall_time == pytest.approx(4.0)
+    assert backend.limits == pytest.approx([3.5, 2.5, 1.5, 0.5])
+
+
+def test_time_limit_before_anything_was_verified_is_its_own_status():
+    clock = BentClock()
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    late = FakeChecker(lambda problem: problem.t_rep > 1.0)
+    result = search(late, 2.9, backend=backend, clock=clock, rule="scan", delta_t=0.1, time_limit=2.0)
+    assert result.status is SearchStatus.BUDGET_EXHAUSTED
+    assert result.f_ttr is None
+    assert len(result.probes) == 2
+
+
+def test_time_limit_zero_asks_nobody():
+    source = FakeSource()
+    result = search(until(9.0), source=source, clock=BentClock(), time_limit=0.0)
+    assert result.status is SearchStatus.BUDGET_EXHAUSTED
+    assert source.asked == []
+
+
+def test_time_limit_cuts_the_sides_of_a_probe():
+    clock = BentClock()
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    result = search(until(9.0), source=FakeSource(BOTH), backend=backend, clock=clock, time_limit=0.5)
+    assert len(result.probes) == 1
+    assert len(result.probes[0].tried) == 1
+    assert result.f_ttr == 0.0
+
+
+def test_running_to_the_end_exactly_in_time_is_complete():
+    clock = BentClock()
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    result = search(until(9.0), 1.6, backend=backend, clock=clock, time_limit=10.0)
+    assert result.complete
+
+
+def test_interrupt_keeps_what_was_found():
+    seen = []
+
+    def on_probe(probe):
+        seen.append(probe)
+        if len(seen) == 3:
+            raise KeyboardInterrupt
+
+    result = search(until(9.0), 2.9, on_probe=on_probe, rule="scan", delta_t=0.4)
+    assert len(seen) == len(result.probes) == 3
+    assert result.status is SearchStatus.FOUND
+    assert result.f_ttr == pytest.approx(0.8)
+    assert not result.complete
+
+
+def test_interrupt_in_the_backend_keeps_the_probes_before():
+    count = []
+
+    def on_solve():
+        count.append(1)
+        if len(count) == 3:
+            raise KeyboardInterrupt
+
+    result = search(until(9.0), 2.9, backend=FakeBackend(on_solve=on_solve), rule="scan", delta_t=0.4)
+    assert visited(result) == pytest.approx([0.0, 0.4])
+    assert result.f_ttr == pytest.approx(0.4)
+    assert not result.complete
+
+
+def test_a_bug_in_a_backend_is_not_swallowed():
+    def on_solve():
+        raise KeyError("bug")
+
+    with pytest.raises(KeyError):
+        search(until(9.0), backend=FakeBackend(on_solve=on_solve))
+
+
+def test_a_timeout_raised_inside_a_backend_is_not_the_search_running_out_of_time():
+    def on_solve():
+        raise TimeoutError("solver process")
+
+    with pytest.raises(TimeoutError):
+        search(until(9.0), backend=FakeBackend(on_solve=on_solve))
+
+
+def test_a_stop_iteration_inside_a_backend_does_not_end_the_search_as_complete():
+    def on_solve():
+        next(iter(()))
+
+    with pytest.raises((StopIteration, RuntimeError)):
+        search(until(9.0), backend=FakeBackend(on_solve=on_solve))
+
+
+def test_the_last_feasible_curve_is_offered_as_a_warm_start():
+    backend = FakeBackend()
+    result = search(until(0.8), 1.6, backend=backend, delta_t=0.4)
+    assert backend.warm[0] is None
+    assert backend.warm[1] is result.probes[0].solve.curve
+    assert backend.warm[2] is result.probes[1].solve.curve
+
+
+# -- a backend of one's own --------------------------------------------------------------------------
+
+
+def test_a_new_backend_needs_one_registration(monkeypatch):
+    monkeypatch.setattr(registry, "_EXTRA", {})
+    registry.register("toy", lambda config: FakeBackend(name="toy"))
+    assert "toy" in registry.backend_names()
+    assert registry.available()["toy"] is None
+    backend = registry.make_backend("toy", Config(backend="toy"))
+    result = search(until(1.2), 2.9, backend=backend, delta_t=0.4)
+    assert result.f_ttr == pytest.approx(1.2)
+
+
+def test_a_new_backend_runs_through_the_whole_house(monkeypatch, scenarios):
+    from repair.api import repair
+    from repair.config import load_config
+
+    path = scenarios / "DEU_Flensburg-6_1_T-1.xml"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not in COMMONROAD_SCENARIOS")
+    monkeypatch.setattr(registry, "_EXTRA", {})
+
+    class FullBrake:
+        name = "brake"
+
+        def solve(self, problem, *, warm_start=None, time_limit=None):
+            from repair.reference import SpeedProfile
+
+            s, v = problem.start[0, 0], problem.start[1, 0]
+            profile = SpeedProfile.from_accelerations(s, v, [v / 2.8], [-2.8])
+            return SolveResult(SolveStatus.SOLVED, curve=Shifted(profile, problem.t_rep), objective=0.0)
+
+    registry.register("brake", lambda config: FullBrake())
+    result = repair(path, load_config(preset="scenario_1", backend="brake"))
+    assert result.status is SearchStatus.FOUND
+    assert 1.6 <= result.f_ttr <= 2.6
+
+
+@dataclass
+class Shifted:
+    """A profile that starts later."""
+
+    profile: object
+    t_start: float
+
+    @property
+    def t_end(self):
+        return self.t_start + 20.0
+
+    def sample(self, t):
+        from dataclasses import replace
+
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        return replace(self.profile.sample(times - self.t_start), t=times)
+
+
+def test_unknown_backends_are_named():
+    from repair.errors import BackendError
+
+    with pytest.raises(BackendError, match=r"'egoo'.*ego, casadi, qptr"):
+        registry.make_backend("egoo", Config())
