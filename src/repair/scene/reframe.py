@@ -82,6 +82,7 @@ def as_ego(scene: Scene, obstacle_id: int) -> Scene:
     return replace(
         scene,
         obstacles=tuple(o for o in scene.obstacles if o.id != obstacle_id),
+        recorded_ego=chosen[0],
         start=frozen(start),
         initial_state=replace(
             scene.initial_state, x=x, y=y, orientation=heading, velocity=speed, acceleration=0.0, yaw_rate=0.0
