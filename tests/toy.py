@@ -9,7 +9,15 @@ from repair.types import LateralBounds, Limits, Occupancy, RepairProblem, frozen
 
 DT = 0.1
 LIMITS = Limits(
-    v_max=30.0, v_lat=3.0, a_min=-8.0, a_max=4.0, a_lat=4.0, a_total=8.0, j_lon=60.0, j_lat=60.0, curvature=0.3
+    v_max=30.0,
+    v_lat=3.0,
+    a_min=-8.0,
+    a_max=4.0,
+    a_lat=4.0,
+    a_total=8.0,
+    j_lon=60.0,
+    j_lat=60.0,
+    curvature=0.3,
 )
 WIDE = LateralBounds(frozen([0.0, 500.0]), frozen([-6.0, -6.0]), frozen([6.0, 6.0]))
 NARROW = LateralBounds(frozen([0.0, 500.0]), frozen([-0.5, -0.5]), frozen([0.5, 0.5]))
@@ -43,9 +51,18 @@ def problem(boxes, *, t_rep=0.0, t_end=4.0, v0=10.0, bounds=WIDE, lateral=True, 
     reference = keys.pop("reference", None) or constant(v0)
     at = reference.sample([t_rep])
     return RepairProblem(
-        reference=reference, t_rep=t_rep, t_end=t_end,
+        reference=reference,
+        t_rep=t_rep,
+        t_end=t_end,
         start=frozen([at.position[0], at.velocity[0], at.acceleration[0]]),
-        occupancy=boxes if isinstance(boxes, Occupancy) else occupancy(*boxes), bounds=bounds,
-        limits=keys.pop("limits", LIMITS), clearance=keys.pop("clearance", 1.0), margin=keys.pop("margin", 0.1),
-        passing=passing, curvature_s=frozen([0.0, 500.0]), curvature=frozen([0.0, 0.0]), dt=DT, lateral=lateral,
-    )  # fmt: skip
+        occupancy=boxes if isinstance(boxes, Occupancy) else occupancy(*boxes),
+        bounds=bounds,
+        limits=keys.pop("limits", LIMITS),
+        clearance=keys.pop("clearance", 1.0),
+        margin=keys.pop("margin", 0.1),
+        passing=passing,
+        curvature_s=frozen([0.0, 500.0]),
+        curvature=frozen([0.0, 0.0]),
+        dt=DT,
+        lateral=lateral,
+    )

@@ -8,7 +8,9 @@ published setting belongs to one backend only.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import lru_cache, reduce
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,9 @@ class RepairConfig:
     after_conflict: float = 3.0  # [s]
     clearance: float = 0.3  # the paper's s_f [m]
     margin: float = 0.1  # distance hard backends keep from the inflated box [m]
+    # Margins [m] that hard backends try next where none of the manoeuvres is feasible: down to the
+    # vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
+    relax: list[float] = field(default_factory=lambda: [-0.1, -0.5])
     lateral: str = "road"  # none | lane | same_direction | road
     degree: int = 3
     spacing: float = 0.2  # knot spacing [s]
@@ -133,8 +138,7 @@ class CasadiConfig:
     w_jerk: float = 0.1
     w_reference: float = 0.05
     heading: float = 0.7  # largest angle between the driven path and the axis [rad]
-    presolve: bool = True  # the QP of the linear constraints first: a start, or the proof that there is none
-    rounds: int = 5  # solves around the own solution until the exact constraints are kept
+    rounds: int = 8  # solves around the own solution until the exact constraints are kept
     max_iterations: int = 200
     tolerance: float = 1e-8
 
@@ -294,7 +298,7 @@ def load_config(
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
-    schema = OmegaConf.structured(Config)
+    schema = _schema()
     layers: list[tuple[str, Any]] = []
     if preset is not None:
         path = _PRESETS / f"{preset}.yaml"
@@ -308,6 +312,7 @@ def load_config(
     merged = schema
     own: list[Any] = []
     for name, layer in layers:
+        _check_sections(name, layer, schema)
         try:
             merged = OmegaConf.merge(merged, layer)
         except (OmegaConfBaseException, ValueError, TypeError) as error:
@@ -326,10 +331,37 @@ def _apply_backend_section(merged: Any, explicit: list[Any]) -> Any:
     merged.for_backend = {}
     if section is None:
         return merged
+    name = f"for_backend.{merged.backend}"
+    if not OmegaConf.is_dict(section):
+        raise ConfigError(f"configuration key {name!r} is {section!r}; it must hold a mapping of keys")
+    _check_sections(name, section, _schema())
     try:
         return OmegaConf.merge(merged, section, *explicit)
     except (OmegaConfBaseException, ValueError, TypeError) as error:
-        raise ConfigError(_explain(f"for_backend.{merged.backend}", error)) from error
+        raise ConfigError(_explain(name, error)) from error
+
+
+@lru_cache(maxsize=1)
+def _schema() -> Any:
+    from omegaconf import OmegaConf
+
+    return OmegaConf.structured(Config)
+
+
+def _check_sections(layer: str, node: Any, schema: Any, prefix: str = "") -> None:
+    """Refuse a plain value where the schema has a section: OmegaConf's own error does not name the key."""
+    from omegaconf import DictConfig
+
+    for key in node:
+        expected = schema._get_node(key) if key in schema else None
+        if isinstance(expected, DictConfig):
+            value = node._get_node(key)
+            if not isinstance(value, DictConfig) or value._is_none():
+                shown = "empty" if value._is_none() else str(value)
+                named = f"{layer}: configuration key '{prefix}{key}' is {shown}"
+                raise ConfigError(f"{named}; it must hold a mapping of keys")
+            if not value._is_interpolation():
+                _check_sections(layer, value, expected, f"{prefix}{key}.")
 
 
 def _read_yaml(path: Path) -> Any:
@@ -350,12 +382,17 @@ def _read_yaml(path: Path) -> Any:
 
 def _dotted(overrides: Iterable[str] | Mapping[str, Any]) -> Any:
     from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
     from yaml import YAMLError
 
     if isinstance(overrides, Mapping):
         layer = OmegaConf.create()
         for key, value in overrides.items():
-            OmegaConf.update(layer, key, value)
+            try:
+                OmegaConf.update(layer, key, value)
+            except (OmegaConfBaseException, ValueError, TypeError) as error:
+                message = str(error).splitlines()[0]
+                raise ConfigError(f"overrides: configuration key {key!r} is {value!r}: {message}") from error
         return layer
     items = list(overrides)
     for item in items:
@@ -380,42 +417,40 @@ def _explain(layer: str, error: Exception) -> str:
     return f"{layer}: configuration key {key!r}: {message}" if key else f"{layer}: {message}"
 
 
-def _flat_keys() -> set[str]:
-    from omegaconf import DictConfig, OmegaConf
-
+@lru_cache(maxsize=1)
+def _flat_keys() -> frozenset[str]:
     keys: set[str] = set()
 
     def walk(node: Any, prefix: str) -> None:
-        for name in node:
-            full = f"{prefix}{name}"
-            keys.add(full)
-            child = node._get_node(name)
-            if isinstance(child, DictConfig):
-                walk(child, f"{full}.")
+        for item in fields(node):
+            keys.add(f"{prefix}{item.name}")
+            child = getattr(node, item.name)
+            if is_dataclass(child):
+                walk(child, f"{prefix}{item.name}.")
 
-    walk(OmegaConf.structured(Config), "")
-    return keys
+    walk(Config(), "")
+    return frozenset(keys)
 
 
 def _validated(merged: Any) -> Config:
-    import math
-
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
-    for key, choices in CHOICES.items():
-        value = OmegaConf.select(merged, key)
-        if value not in choices:
-            raise ConfigError(f"configuration key {key!r} is {value!r}; it must be one of {', '.join(choices)}")
-    for key in _flat_keys():
-        value = OmegaConf.select(merged, key)
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ConfigError(f"configuration key {key!r} is {value}; it must be a finite number")
-    for key, (low, high) in RANGES.items():
-        value = OmegaConf.select(merged, key)
-        if value is not None and not low <= value <= high:
-            raise ConfigError(f"configuration key {key!r} is {value}; it must lie in [{low:g}, {high:g}]")
     try:
-        return OmegaConf.to_object(merged)  # type: ignore[return-value]
+        config: Any = OmegaConf.to_object(merged)
     except OmegaConfBaseException as error:
         raise ConfigError(_explain("configuration", error)) from error
+    values: dict[str, Any] = {key: reduce(getattr, key.split("."), config) for key in _flat_keys()}
+    for key, choices in CHOICES.items():
+        if values[key] not in choices:
+            known = ", ".join(choices)
+            raise ConfigError(f"configuration key {key!r} is {values[key]!r}; it must be one of {known}")
+    for key, value in values.items():
+        if isinstance(value, float) and not isfinite(value):
+            raise ConfigError(f"configuration key {key!r} is {value}; it must be a finite number")
+    for key, (low, high) in RANGES.items():
+        value = values[key]
+        if value is not None and not low <= value <= high:
+            raise ConfigError(f"configuration key {key!r} is {value}; it must lie in [{low:g}, {high:g}]")
+    assert isinstance(config, Config)
+    return config

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 import re
-from collections.abc import Callable
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,6 +22,7 @@ from repair.baselines.bernstein import BernsteinCurve
 from repair.bspline import UniformBSpline
 from repair.checker import SplicedCurve
 from repair.errors import OutputError
+from repair.files import write_files
 from repair.types import Curve, Probe, SearchStatus, SolveResult
 
 if TYPE_CHECKING:
@@ -31,7 +30,18 @@ if TYPE_CHECKING:
     from repair.metrics import Peaks
     from repair.scene.commonroad import Scene
 
-__all__ = ["probe_peaks", "provenance", "save", "saved", "to_dict", "to_dynamic_obstacle", "to_json", "to_solution", "to_trajectory"]
+__all__ = [
+    "probe_peaks",
+    "provenance",
+    "save",
+    "saved",
+    "to_dict",
+    "to_dynamic_obstacle",
+    "to_json",
+    "to_solution",
+    "to_trajectory",
+    "write_files",
+]
 
 #: SHA-256 of scenario files that the paper uses, as CommonRoad publishes them.
 OFFICIAL = {
@@ -39,8 +49,8 @@ OFFICIAL = {
 }
 
 _PACKAGES = (
-    "commonroad-repair", "numpy", "scipy", "casadi", "qpsolvers", "osqp", "daqp", "clarabel", "shapely", "omegaconf",
-    "commonroad-io", "commonroad-drivability-checker", "commonroad-vehicle-models",
+    "commonroad-repair", "numpy", "scipy", "casadi", "qpsolvers", "osqp", "daqp", "clarabel", "shapely",
+    "omegaconf", "commonroad-io", "commonroad-drivability-checker", "commonroad-vehicle-models",
 )  # fmt: skip
 
 
@@ -169,7 +179,8 @@ def _probe(result: RepairResult, probe: Probe) -> dict[str, Any]:
         "feasible": probe.feasible,
         "reasons": list(probe.verdict.reasons),
         "details": [
-            {"reason": v.reason.value, "t_s": _number(v.time), "detail": v.detail} for v in probe.verdict.violations
+            {"reason": v.reason.value, "t_s": _number(v.time), "detail": v.detail}
+            for v in probe.verdict.violations
         ],
         "maneuver": probe.maneuver.value if probe.maneuver is not None else None,
         "tried": list(probe.tried),
@@ -209,12 +220,13 @@ def _curve(curve: Curve | None, t_end: float | None = None) -> dict[str, Any] | 
         }
     t_start, t_end = curve.t_start, min(curve.t_end, curve.t_end if t_end is None else t_end)
     samples = curve.sample(np.linspace(t_start, t_end, max(2, round((t_end - t_start) / 0.1) + 1)))
+    columns = (samples.position, samples.velocity, samples.acceleration)
     return {
         "type": "samples",
         "t_s": _column(samples.t),
         **{
             f"{axis}_{name}": _column(values[:, k])
-            for name, values in (("m", samples.position), ("mps", samples.velocity), ("mps2", samples.acceleration))
+            for name, values in zip(("m", "mps", "mps2"), columns, strict=True)
             for k, axis in enumerate(("s", "l"))
         },
     }
@@ -243,7 +255,8 @@ def _limits(result: RepairResult) -> dict[str, float | None]:
     limits = result.prepared.limits
     units = {"v": "mps", "a": "mps2", "j": "mps3"}
     return {
-        f"{name}_{units.get(name.split('_')[0], 'per_m')}": _number(value) for name, value in asdict(limits).items()
+        f"{name}_{units.get(name.split('_')[0], 'per_m')}": _number(value)
+        for name, value in asdict(limits).items()
     }
 
 
@@ -308,7 +321,13 @@ def to_solution(result: RepairResult) -> Any:
     OutputError
         If there is no verified trajectory: a colliding one is never handed out as a solution.
     """
-    from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution, VehicleModel, VehicleType
+    from commonroad.common.solution import (
+        CostFunction,
+        PlanningProblemSolution,
+        Solution,
+        VehicleModel,
+        VehicleType,
+    )
 
     if not _solved(result):
         raise OutputError(f"there is no solution to write: {result.status.sentence}")
@@ -381,65 +400,3 @@ def saved(result: RepairResult, folder: Path, *, figure: bool = True) -> tuple[d
     result_file = {"result.json": to_json(content).encode()}
     stale = [file for file in (solution, *figures) if file not in files]
     return content, write_files(folder, {**result_file, **files}, stale)
-
-
-def write_files(folder: Path, files: dict[str, bytes], stale: list[str] | None = None) -> list[Path]:
-    """Write files into a folder (made if need be): all aside first, then renamed, so none is ever half there.
-
-    Parameters
-    ----------
-    folder : Path
-    files : dict
-        Name to content.
-    stale : list of str
-        Names to remove: what an earlier run would have left under our own names.
-
-    Raises
-    ------
-    OutputError
-        With the operating system's reason.
-    """
-    made = _make_folder(folder)
-    aside = {name: folder / f".{name}.{os.getpid()}.part" for name in files}
-    try:
-        for name, content in files.items():
-            _write(aside[name], content)
-        for name in stale or []:
-            (folder / name).unlink(missing_ok=True)
-        # The first file names the others: it comes last.
-        for name in reversed(list(files)):
-            os.replace(aside[name], folder / name)
-    except OSError as error:
-        raise OutputError(f"results cannot be written to {folder}: {error.strerror or error}") from error
-    finally:
-        for path in aside.values():
-            _quietly(path.unlink)
-        for path in made:
-            _quietly(path.rmdir)  # only succeeds where nothing was written
-    return [folder / name for name in files]
-
-
-def _make_folder(folder: Path) -> list[Path]:
-    """Make a folder and its parents; return those that were not there, innermost first."""
-    missing = [p for p in (folder, *folder.parents) if not p.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        for path in missing:
-            _quietly(path.rmdir)
-        raise OutputError(f"the output folder {folder} cannot be made: {error.strerror or error}") from error
-    return missing
-
-
-def _write(path: Path, content: bytes) -> None:
-    with open(path, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _quietly(action: Callable[[], None]) -> None:
-    try:
-        action()
-    except OSError:
-        pass

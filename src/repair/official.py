@@ -7,6 +7,7 @@ sweeps and certificates do.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,14 +45,19 @@ class OfficialVerdict:
         return self.feasible and self.collision_free and self.on_road
 
 
-def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> OfficialVerdict:
+def check_solution_file(
+    file: Path, scenario: Any, planning_problems: Any, without: tuple[int, ...] = ()
+) -> OfficialVerdict:
     """Read a CommonRoad solution file and have it checked.
 
     Parameters
     ----------
     file : Path
     scenario : commonroad.scenario.scenario.Scenario
+        Not changed.
     planning_problems : commonroad.planning.planning_problem.PlanningProblemSet
+    without : tuple of int
+        Obstacles to leave out: recordings of the ego itself, with which every solution would collide.
 
     Raises
     ------
@@ -65,6 +71,9 @@ def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> Of
         solution = CommonRoadSolutionReader.open(str(file))
     except Exception as error:
         raise RepairError(f"{file} is not a CommonRoad solution file: {error}") from error
+    scenario = deepcopy(scenario)
+    for obstacle in [o for o in scenario.dynamic_obstacles if o.obstacle_id in without]:
+        scenario.remove_obstacle(obstacle)
     try:
         answers = solution_checker.solution_feasible(solution, scenario.dt, planning_problems)
         feasible = all(bool(answer[0]) for answer in answers.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -90,9 +91,24 @@ class ProblemFactory:
         s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
         return frozen(s), frozen(self.scene.frame.curvature(s))
 
-    def at(self, t_rep: float) -> tuple[RepairProblem, ...]:
-        """One problem for each open side of passing, the gentlest guide first."""
+    def relaxed(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
+        """The problems again with smaller and smaller margins, as ``repair.relax`` lists them."""
+        for margin in self.config.repair.relax:
+            problems = self.at(t_rep, margin)
+            if problems:
+                yield problems
+
+    def at(self, t_rep: float, margin: float | None = None) -> tuple[RepairProblem, ...]:
+        """One problem for each open side of passing, the gentlest guide first.
+
+        Parameters
+        ----------
+        margin : float, optional
+            Distance to the inflated boxes [m]; negative values allow into them. By default
+            ``repair.margin``.
+        """
         settings = self.config.repair
+        margin = settings.margin if margin is None else margin
         lateral = settings.lateral != "none"
         step = self.scene.dt
         count = int(np.ceil((self.t_end - t_rep) / step - 1e-6))
@@ -102,7 +118,7 @@ class ProblemFactory:
         occupancy = self._within_reach(start, t_rep, reference.position, lateral)
         s, curvature = self._axis
         passings = open_passings(
-            reference, start, occupancy, self.bounds, self.limits, settings.margin, lateral, (s, curvature)
+            reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature)
         )
         return tuple(
             RepairProblem(
@@ -114,7 +130,7 @@ class ProblemFactory:
                 bounds=self.bounds,
                 limits=self.limits,
                 clearance=settings.clearance,
-                margin=settings.margin,
+                margin=margin,
                 passing=passing,
                 curvature_s=s,
                 curvature=curvature,

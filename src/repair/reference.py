@@ -106,9 +106,7 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
     if config.source == "constant":
         return SpeedProfile.from_accelerations(s0, v0, [scene.horizon], [0.0])
     if config.source == "accelerate":
-        target = max(v0, _CRUISE)
-        if scene.speed_limit is not None:
-            target = max(v0, float(scene.speed_limit.at(s0)))
+        target = max(v0, _limit_at(scene, s0))
         ramp = min(target - v0, scene.horizon)
         return SpeedProfile.from_accelerations(s0, v0, [ramp, max(scene.horizon - ramp, 0.0)], [1.0, 0.0])
     positions, what = recorded_positions(scene, config)
@@ -126,6 +124,12 @@ def recorded_positions(scene: Scene, config: ReferenceConfig) -> tuple[Array, st
     if config.source == "recorded":
         return _recorded(scene, config.obstacle_id)
     return _from_solution(scene, config.file)
+
+
+def _limit_at(scene: Scene, s: float) -> float:
+    """Speed limit [m/s] at ``s``; the speed of built-up areas where no sign gives one."""
+    limit = float(scene.speed_limit.at(s)) if scene.speed_limit is not None else np.inf
+    return limit if np.isfinite(limit) else _CRUISE
 
 
 # -- planner -------------------------------------------------------------------------------------
@@ -174,7 +178,7 @@ def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> U
     n_layers = max(1, int(np.ceil(scene.horizon / config.time_step)))
     desired = config.desired_speed
     if desired is None:
-        desired = max(v0, float(scene.speed_limit.at(s0)) if scene.speed_limit is not None else _CRUISE)
+        desired = max(v0, _limit_at(scene, s0))
     lattice = _lattice(v0, max(desired, v0), config, n_layers)
     positions = s0 + lattice.unit * np.arange(lattice.n_positions)
     node_cost = _node_cost(scene, config, lattice, positions, desired)

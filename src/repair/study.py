@@ -167,7 +167,9 @@ def _official(result: Any) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "solution.xml"
         file.write_bytes(CommonRoadSolutionWriter(result.to_solution()).dump().encode())
-        verdict = check_solution_file(file, scene.scenario, PlanningProblemSet([scene.planning_problem]))
+        own = () if scene.recorded_ego is None else (scene.recorded_ego.id,)
+        problems = PlanningProblemSet([scene.planning_problem])
+        verdict = check_solution_file(file, scene.scenario, problems, without=own)
     return {
         "official_feasible": verdict.feasible,
         "official_collision_free": verdict.collision_free,

@@ -64,8 +64,6 @@ def test_published_times(result: dict[str, Any]) -> None:
 def test_deceleration_and_speed(result: dict[str, Any]) -> None:
     assert -2.1 <= result["peak_deceleration_mps2"] <= -1.5
     assert result["min_speed_mps"] >= -0.05
-    # The weakest braking that can stop before the conflict's box: v²/2d with v, d at t_rep = 1.6 s.
-    assert result["peak_deceleration_mps2"] <= -1.38 + 0.1
 
 
 @pytest.mark.parametrize("rule", [["search.upper=null"], ["search.upper=null", "search.rule=scan"]])
@@ -81,6 +79,8 @@ def test_other_rules_give_the_same_f_ttr(
 def test_official_checks_accept_the_solution_file(source: tuple[str, Path], folder: Path) -> None:
     from commonroad.common.file_reader import CommonRoadFileReader
     from commonroad.common.solution import CommonRoadSolutionReader
+    from commonroad_dc.boundary.boundary import create_road_boundary_obstacle
+    from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch import create_collision_object
     from commonroad_dc.feasibility import solution_checker as official
 
     scenario, problems = CommonRoadFileReader(str(source[1])).open()
@@ -90,7 +90,10 @@ def test_official_checks_accept_the_solution_file(source: tuple[str, Path], fold
     assert all(answer[0] for answer in answers.values())
     assert official.starts_at_correct_state(solution, problems)
     assert not official.obstacle_collision(scenario, problems, solution)
-    assert not official.boundary_collision(scenario, problems, solution)
+    # official.boundary_collision needs the non-free package triangle; this is the checker's other way.
+    _, road_edge = create_road_boundary_obstacle(scenario, method="obb_rectangles")
+    ego = next(iter(solution.create_dynamic_obstacle().values()))
+    assert not road_edge.collide(create_collision_object(ego))
 
 
 def test_the_official_file_is_used_where_it_is_found(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,18 @@ def scene(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 def repaired(scene: Scene, backend: str = "ego", **keys: Any) -> RepairResult:
     """The search over the whole [0, TTC), on a grid of 0.1 s unless said otherwise."""
-    overrides = {"search.upper": None, "search.delta_t": 0.1, **{k.replace("__", "."): v for k, v in keys.items()}}
+    overrides = {
+        "search.upper": None,
+        "search.delta_t": 0.1,
+        **{k.replace("__", "."): v for k, v in keys.items()},
+    }
     return repair(scene, load_config(preset="scenario_1", backend=backend, overrides=overrides))
 
 
 def falling(values: list[float | None]) -> bool:
     """Never rising, and lower at the end; None (nothing feasible at all) is the lowest."""
     numbers = [-1.0 if v is None else v for v in values]
-    return all(b <= a + 1e-9 for a, b in zip(numbers, numbers[1:])) and numbers[-1] < numbers[0]
+    return all(b <= a + 1e-9 for a, b in pairwise(numbers)) and numbers[-1] < numbers[0]
 
 
 def with_speed(scene: Scene, speed: float) -> Scene:
@@ -54,8 +59,8 @@ def with_speed(scene: Scene, speed: float) -> Scene:
             (2.25, 3.0),
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="the soft penalty does not keep the whole margin, and the checker judges true rectangles: "
-                "with S_offset 2.25 m (0.1 m more than half the vehicle) t_rep = 2.0 s touches, with 3 m it does not",
+                reason="the soft penalty gives up part of the margin, and the checker judges true rectangles: "
+                "with S_offset 2.25 m (half the vehicle + 0.1 m) t_rep = 2.0 s touches, with 3 m not",
             ),
         ),
     ],
@@ -85,6 +90,11 @@ def test_a_finer_grid_finds_no_less_and_less_than_one_step_more(scene: Scene, fi
 def test_stronger_brakes_never_lower_the_f_ttr(scene: Scene) -> None:
     found = []
     for limit in (2.0, 3.0, 8.0):
-        keys = {"limits__a_min": -limit, "limits__a_max": limit, "limits__a_lat": limit, "limits__a_total": limit}
+        keys = {
+            "limits__a_min": -limit,
+            "limits__a_max": limit,
+            "limits__a_lat": limit,
+            "limits__a_total": limit,
+        }
         found.append(repaired(scene, "casadi", **keys).f_ttr)
     assert falling(found[::-1])

@@ -76,7 +76,11 @@ def test_position_velocity_and_acceleration_are_continuous_at_the_knots(spline):
     left, right = spline.sample(knots - eps), spline.sample(knots + eps)
     highest = np.abs(spline.points).max() + 1.0
     for order, (a, b) in enumerate(
-        ((left.position, right.position), (left.velocity, right.velocity), (left.acceleration, right.acceleration))
+        (
+            (left.position, right.position),
+            (left.velocity, right.velocity),
+            (left.acceleration, right.acceleration),
+        )
     ):
         change = 2.0 * eps * 16.0 * highest / spline.spacing ** (order + 1)  # bound on the next derivative
         np.testing.assert_allclose(a, b, atol=change + 1e-9 * highest / spline.spacing**order)

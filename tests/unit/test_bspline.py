@@ -28,7 +28,9 @@ def random_spline(degree, seed=0, n=None, t_start=1.3, spacing=0.4):
 
 
 def scipy_spline(spline):
-    knots = spline.t_start + (np.arange(len(spline.points) + spline.degree + 1) - spline.degree) * spline.spacing
+    knots = (
+        spline.t_start + (np.arange(len(spline.points) + spline.degree + 1) - spline.degree) * spline.spacing
+    )
     return BSpline(knots, spline.points, spline.degree)
 
 
@@ -38,7 +40,9 @@ def test_values_and_derivatives_are_those_of_scipy(degree):
     t = np.linspace(spline.t_start, spline.t_end, 101)[:-1]
     sampled, exact = spline.sample(t), scipy_spline(spline)
     for order, values in enumerate((sampled.position, sampled.velocity, sampled.acceleration, sampled.jerk)):
-        np.testing.assert_allclose(values, exact.derivative(order)(t) if order else exact(t), rtol=1e-9, atol=1e-8)
+        np.testing.assert_allclose(
+            values, exact.derivative(order)(t) if order else exact(t), rtol=1e-9, atol=1e-8
+        )
 
 
 @pytest.mark.parametrize("degree", DEGREES)
@@ -47,7 +51,9 @@ def test_values_are_those_of_the_cox_de_boor_recursion(degree):
     plain = literal.LiteralCurve(spline.t_start, spline.spacing, degree, spline.points.tolist())
     t = spline.t_start + np.array([0.0, 0.1, 0.4, 0.77, 1.2, 2.4 - 1e-9])
     for name in ("position", "velocity", "acceleration", "jerk"):
-        np.testing.assert_allclose(getattr(spline.sample(t), name), getattr(plain.sample(t), name), rtol=1e-8, atol=1e-7)
+        np.testing.assert_allclose(
+            getattr(spline.sample(t), name), getattr(plain.sample(t), name), rtol=1e-8, atol=1e-7
+        )
 
 
 @pytest.mark.parametrize("degree", DEGREES)
@@ -75,7 +81,9 @@ def test_derivative_points_are_control_points_of_the_derivative(degree):
     t = np.linspace(spline.t_start, spline.t_end, 31)[:-1]
     for order, name in ((1, "velocity"), (2, "acceleration"), (3, "jerk")):
         points = spline.derivative_points(order)
-        np.testing.assert_allclose(points, derivative_matrix(len(spline.points), order, 0.4) @ spline.points, atol=1e-9)
+        np.testing.assert_allclose(
+            points, derivative_matrix(len(spline.points), order, 0.4) @ spline.points, atol=1e-9
+        )
         derived = UniformBSpline(spline.t_start, spline.spacing, degree - order, points)
         expected = scipy_spline(derived)(t)
         np.testing.assert_allclose(getattr(spline.sample(t), name), expected, rtol=1e-9, atol=1e-8)
@@ -84,7 +92,9 @@ def test_derivative_points_are_control_points_of_the_derivative(degree):
 def test_derivative_points_are_those_of_the_paper():
     spline = random_spline(3, seed=3)
     for matrix, points in zip(
-        (spline.derivative_points(k) for k in (1, 2, 3)), literal.derivatives(spline.points.tolist(), 0.4), strict=True
+        (spline.derivative_points(k) for k in (1, 2, 3)),
+        literal.derivatives(spline.points.tolist(), 0.4),
+        strict=True,
     ):
         np.testing.assert_allclose(matrix, points, rtol=1e-12, atol=1e-9)
 
@@ -197,7 +207,8 @@ def test_fit_does_not_alias_its_caches():
 
 
 @pytest.mark.parametrize(
-    ("duration", "spacing", "segments"), [(4.0, 0.4, 10), (4.1, 0.4, 11), (1.2000000000000002, 0.4, 3), (0.0, 0.4, 1)]
+    "duration, spacing, segments",
+    [(4.0, 0.4, 10), (4.1, 0.4, 11), (1.2000000000000002, 0.4, 3), (0.0, 0.4, 1)],
 )
 def test_number_of_control_points_covers_the_duration(duration, spacing, segments):
     assert n_points_for(duration, spacing, 3) == segments + 3

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +62,16 @@ def test_without_a_scenario_the_bundled_one_is_run(capsys: pytest.CaptureFixture
     assert "reconstruction" in out
     assert "official file," not in out
     assert "preset scenario_1" in out
-    for word in ("TTC", "F-TTR", "t_rep", "feasible", "peak deceleration", "minimum speed", "search", "--out DIR"):
+    for word in (
+        "TTC",
+        "F-TTR",
+        "t_rep",
+        "feasible",
+        "peak deceleration",
+        "minimum speed",
+        "search",
+        "--out DIR",
+    ):
         assert word in out
     assert err == ""
 
@@ -114,7 +122,9 @@ def test_configuration_reaches_the_search(
     assert [p["t_rep_s"] for p in content["probes"]] == [0.0, 0.8, 1.6, 2.4]
 
 
-def test_no_conflict_is_an_answer(scenario_file: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_no_conflict_is_an_answer(
+    scenario_file: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     argv = ["run", str(scenario_file), "--set", "scene.horizon=1.0", "--out", str(tmp_path)]
     assert main(argv) == 0
     out = capsys.readouterr().out
@@ -159,7 +169,7 @@ def test_a_solution_file_is_a_reference(
 
 
 @pytest.fixture
-def interrupted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     """A backend `ctrl-c`: the soft one, but the user presses Ctrl-C during the third solve."""
 
     class Interrupted:
@@ -175,13 +185,23 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
             return self.inner.solve(problem, **keys)
 
     monkeypatch.setitem(registry._EXTRA, "ctrl-c", Interrupted)
-    yield
 
 
 @pytest.mark.usefixtures("interrupted")
-def test_an_interrupt_loses_nothing_that_was_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_an_interrupt_loses_nothing_that_was_found(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     before = signal.getsignal(signal.SIGINT)
-    argv = ["run", "--backend", "ctrl-c", "--set", "search.rule=scan", "search.sides=first", "--out", str(tmp_path)]
+    argv = [
+        "run",
+        "--backend",
+        "ctrl-c",
+        "--set",
+        "search.rule=scan",
+        "search.sides=first",
+        "--out",
+        str(tmp_path),
+    ]
     assert main([*argv, "--no-figure"]) == 130
     out, err = capsys.readouterr()
     assert "found: a repaired trajectory passed every check" in out
@@ -219,7 +239,9 @@ def test_a_time_limit_is_an_answer(capsys: pytest.CaptureFixture[str]) -> None:
 def test_backends_says_what_is_missing(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(registry._BACKENDS, "other", ("repair.nowhere", "make", ("no_such_package",), "another one"))
+    monkeypatch.setitem(
+        registry._BACKENDS, "other", ("repair.nowhere", "make", ("no_such_package",), "another one")
+    )
     assert main(["backends"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("ego ") and "soft penalties" in line for line in lines)
@@ -234,7 +256,13 @@ def test_presets_and_config(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["config", "--preset", "scenario_1", "--set", "search.delta_t=0.1"]) == 0
     resolved = yaml.safe_load(capsys.readouterr().out)
     assert resolved["scene"]["s_offset"] == 2.25
-    assert resolved["search"] == {"rule": "bisect", "delta_t": 0.1, "upper": 2.0, "time_limit": None, "sides": "best"}
+    assert resolved["search"] == {
+        "rule": "bisect",
+        "delta_t": 0.1,
+        "upper": 2.0,
+        "time_limit": None,
+        "sides": "best",
+    }
     assert main(["config", "--table"]) == 0
     table = capsys.readouterr().out
     assert "| `search.delta_t` | `0.4` | 0.001 to 1000 | resolution of the search grid [s] |" in table
@@ -293,7 +321,9 @@ def test_a_scenario_without_a_planning_problem(
     import re
 
     file = tmp_path / "empty.xml"
-    file.write_text(re.sub(r"<planningProblem .*</planningProblem>", "", text_of(scenario_file), flags=re.DOTALL))
+    file.write_text(
+        re.sub(r"<planningProblem .*</planningProblem>", "", text_of(scenario_file), flags=re.DOTALL)
+    )
     assert "contains no planning problem" in refused(["run", str(file)], capsys)
 
 
@@ -354,7 +384,10 @@ def test_an_output_folder_that_cannot_be_written(capsys: pytest.CaptureFixture[s
 def test_a_solution_for_another_scenario(
     scenario_file: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert main(["run", str(scenario_file), "--set", "scene.horizon=1.0", "--out", str(tmp_path), "--no-figure"]) == 0
+    assert (
+        main(["run", str(scenario_file), "--set", "scene.horizon=1.0", "--out", str(tmp_path), "--no-figure"])
+        == 0
+    )
     capsys.readouterr()
     solution = next(tmp_path.glob("solution_*.xml"))
     solution.write_text(text_of(solution).replace("RepairTJunction", "Elsewhere"))

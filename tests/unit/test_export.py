@@ -155,7 +155,9 @@ def test_without_a_repair_figures_are_null(found: RepairResult, status: SearchSt
 
 
 def test_infinite_and_missing_numbers_are_null(found: RepairResult) -> None:
-    probe = replace(found.search.probes[0], solve=SolveResult(SolveStatus.INFEASIBLE, residuals={"a": float("nan")}))
+    probe = replace(
+        found.search.probes[0], solve=SolveResult(SolveStatus.INFEASIBLE, residuals={"a": float("nan")})
+    )
     search = replace(found.search, probes=(probe,), conflict=Conflict(float("inf")))
     content = strict(to_json(to_dict(replace(found, search=search))))
     assert content["ttc_s"] is None

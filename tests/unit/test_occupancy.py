@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import toy
 
 from repair.occupancy import build_occupancy, first_entry, relevant, shrink_to_start
 from repair.scene.frame import FrenetFrame
 from repair.scene.obstacles import Obstacle
 from repair.types import FrenetTrajectory, Occupancy, frozen
-from tests import toy
 
 STRAIGHT = FrenetFrame.from_points([[0.0, 0.0], [200.0, 0.0]])
 _TURN = np.linspace(0.0, 0.5 * np.pi, 60)
 # 40 m straight on, a left turn of 12 m radius, and on
 BEND = FrenetFrame.from_points(
-    np.vstack([[[x, 0.0] for x in np.arange(0.0, 40.0, 2.0)],
-               np.column_stack([40.0 + 12.0 * np.sin(_TURN), 12.0 - 12.0 * np.cos(_TURN)]),
-               [[52.0, y] for y in np.arange(14.0, 60.0, 2.0)]])
-)  # fmt: skip
+    np.vstack(
+        [
+            [[x, 0.0] for x in np.arange(0.0, 40.0, 2.0)],
+            np.column_stack([40.0 + 12.0 * np.sin(_TURN), 12.0 - 12.0 * np.cos(_TURN)]),
+            [[52.0, y] for y in np.arange(14.0, 60.0, 2.0)],
+        ]
+    )
+)
 
 
 def outline(x, y, heading, length, width, apart=0.5):
     """Points on the edge of a rectangle, the corners among them."""
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]) * [0.5 * length, 0.5 * width]
     points = []
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in itertools.pairwise(corners):
         count = int(np.ceil(np.hypot(*(b - a)) / apart))
         points += [a + (b - a) * k / count for k in range(count)]
     c, s = np.cos(heading), np.sin(heading)
@@ -137,7 +143,9 @@ def test_an_obstacle_is_there_at_its_first_and_last_step_and_not_beyond():
 
 
 def test_a_single_step_holds_at_that_step_only():
-    boxes = Occupancy(frozen([0.0]), np.array([1]), frozen([[[1.0, 1.0]]]), frozen([[[2.0, 2.0]]]), np.array([True]))
+    boxes = Occupancy(
+        frozen([0.0]), np.array([1]), frozen([[[1.0, 1.0]]]), frozen([[[2.0, 2.0]]]), np.array([True])
+    )
     lower, _ = boxes.at([0.0, 0.5])
     np.testing.assert_allclose(lower[0, 0], [1.0, 1.0])
     assert np.isnan(lower[0, 1]).all()
@@ -156,10 +164,18 @@ def test_select_keeps_rows_together():
 
 
 @pytest.mark.parametrize(
-    ("s", "l", "inside"),
-    [(10.0, 0.0, False), (10.0 + 1e-9, 0.0, True), (14.0, 0.0, False), (12.0, 1.0, False), (12.0, -1.0, False),
-     (12.0, 1.0 - 1e-9, True), (9.0, 0.0, False), (12.0, 3.0, False)],
-)  # fmt: skip
+    "s, l, inside",
+    [
+        (10.0, 0.0, False),
+        (10.0 + 1e-9, 0.0, True),
+        (14.0, 0.0, False),
+        (12.0, 1.0, False),
+        (12.0, -1.0, False),
+        (12.0, 1.0 - 1e-9, True),
+        (9.0, 0.0, False),
+        (12.0, 3.0, False),
+    ],
+)
 def test_the_boundary_of_a_box_is_free(s, l, inside):  # noqa: E741
     boxes = toy.occupancy(toy.box((10.0, 14.0), (-1.0, 1.0)))
     assert (first_entry(boxes, path(0.5, s, l)) == (0, 0)) is inside
@@ -167,7 +183,9 @@ def test_the_boundary_of_a_box_is_free(s, l, inside):  # noqa: E741
 
 def test_first_entry_is_the_first_sample_and_its_obstacle():
     boxes = toy.occupancy(
-        toy.box((0.0, 100.0), (3.0, 5.0)), toy.box((40.0, 50.0), (-1.0, 1.0)), toy.box((15.0, 20.0), (-1.0, 1.0))
+        toy.box((0.0, 100.0), (3.0, 5.0)),
+        toy.box((40.0, 50.0), (-1.0, 1.0)),
+        toy.box((15.0, 20.0), (-1.0, 1.0)),
     )
     t = np.arange(61) * 0.1
     assert first_entry(boxes, path(t, 10.0 * t, 0.0)) == (16, 2)
@@ -190,11 +208,18 @@ def test_scenario_time_ends_the_obstacles_and_not_the_check():
 
 
 @pytest.mark.parametrize(
-    ("start", "axis", "side"), [((10.2, 0.0), 0, "lower"), ((13.9, 0.0), 0, "upper"), ((12.0, 0.9), 1, "upper"),
-                                ((12.0, -0.95), 1, "lower")],
-)  # fmt: skip
+    "start, axis, side",
+    [
+        ((10.2, 0.0), 0, "lower"),
+        ((13.9, 0.0), 0, "upper"),
+        ((12.0, 0.9), 1, "upper"),
+        ((12.0, -0.95), 1, "lower"),
+    ],
+)
 def test_the_margin_is_taken_back_on_the_nearest_side(start, axis, side):
-    boxes = toy.occupancy(toy.box((10.0, 14.0), (-1.0, 1.0), v=(1.0, 0.0)), toy.box((50.0, 54.0), (-1.0, 1.0)))
+    boxes = toy.occupancy(
+        toy.box((10.0, 14.0), (-1.0, 1.0), v=(1.0, 0.0)), toy.box((50.0, 54.0), (-1.0, 1.0))
+    )
     shrunk, notes = shrink_to_start(boxes, np.array(start), set())
     depth = getattr(shrunk, side)[0, :, axis] - getattr(boxes, side)[0, :, axis]
     taken = abs(getattr(boxes, side)[0, 0, axis] - start[axis])
@@ -216,14 +241,18 @@ def test_true_contact_keeps_its_margin():
 
 
 def test_nothing_changes_where_the_start_is_free_or_nobody_is_there_yet():
-    boxes = toy.occupancy(toy.box((10.0, 14.0), (-1.0, 1.0)), toy.box((0.0, 8.0), (-1.0, 1.0), present=(0.5, 9.0)))
+    boxes = toy.occupancy(
+        toy.box((10.0, 14.0), (-1.0, 1.0)), toy.box((0.0, 8.0), (-1.0, 1.0), present=(0.5, 9.0))
+    )
     for start in ([5.0, 0.0], [10.0, 0.0], [12.0, 1.0]):
         shrunk, notes = shrink_to_start(boxes, np.array(start), set())
         assert shrunk is boxes
         assert notes == ()
 
 
-@given(st.lists(st.tuples(st.floats(0, 20), st.floats(0.1, 9), st.floats(-3, 3), st.floats(0.1, 4)), max_size=5))
+@given(
+    st.lists(st.tuples(st.floats(0, 20), st.floats(0.1, 9), st.floats(-3, 3), st.floats(0.1, 4)), max_size=5)
+)
 def test_after_shrinking_the_ego_starts_in_no_margin(rows):
     boxes = toy.occupancy(*(toy.box((s, s + a), (l, l + b)) for s, a, l, b in rows), duration=0.5)  # noqa: E741
     start = np.array([10.0, 0.0])
@@ -236,21 +265,32 @@ def test_after_shrinking_the_ego_starts_in_no_margin(rows):
 # -- culling -----------------------------------------------------------------------------------------
 
 moving_box = st.tuples(
-    st.floats(-30.0, 60.0), st.floats(0.2, 10.0), st.floats(-10.0, 10.0), st.floats(0.2, 5.0),
-    st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(0.0, 2.0), st.floats(0.1, 3.0),
-)  # fmt: skip
+    st.floats(-30.0, 60.0),
+    st.floats(0.2, 10.0),
+    st.floats(-10.0, 10.0),
+    st.floats(0.2, 5.0),
+    st.floats(-20.0, 20.0),
+    st.floats(-20.0, 20.0),
+    st.floats(0.0, 2.0),
+    st.floats(0.1, 3.0),
+)
 
 
 @given(st.lists(moving_box, min_size=1, max_size=4), st.floats(0.0, 1.5), st.floats(0.2, 2.0), st.data())
 def test_culling_keeps_whatever_the_ego_could_touch(rows, t_start, duration, data):
     boxes = toy.occupancy(
-        *(toy.box((s, s + a), (l, l + b), v=(vs, vl), present=(begin, begin + stay))
-          for s, a, l, b, vs, vl, begin, stay in rows), duration=3.0,  # noqa: E741
-    )  # fmt: skip
+        *(
+            toy.box((s, s + a), (l, l + b), v=(vs, vl), present=(begin, begin + stay))
+            for s, a, l, b, vs, vl, begin, stay in rows  # noqa: E741
+        ),
+        duration=3.0,
+    )
     reach, room = np.array([0.0, 40.0]), np.array([-2.0, 2.0])
     t_end = t_start + duration
     kept = set(relevant(boxes, np.zeros((3, 2)), t_start, t_end, reach, room).ids.tolist())
-    share = data.draw(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=30))
+    share = data.draw(
+        st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=30)
+    )
     for a, b, c in share:
         t = np.array([t_start + a * duration])
         for k in range(len(boxes)):
@@ -280,8 +320,11 @@ def test_culling_looks_at_the_step_after_an_end_between_steps():
 
 def test_culling_drops_what_is_out_of_reach():
     boxes = toy.occupancy(
-        toy.box((50.0, 60.0), (-1.0, 1.0)), toy.box((10.0, 20.0), (3.0, 5.0)),
-        toy.box((10.0, 20.0), (-1.0, 1.0), present=(2.5, 3.0)), toy.box((10.0, 20.0), (-1.0, 1.0)), duration=3.0,
-    )  # fmt: skip
+        toy.box((50.0, 60.0), (-1.0, 1.0)),
+        toy.box((10.0, 20.0), (3.0, 5.0)),
+        toy.box((10.0, 20.0), (-1.0, 1.0), present=(2.5, 3.0)),
+        toy.box((10.0, 20.0), (-1.0, 1.0)),
+        duration=3.0,
+    )
     kept = relevant(boxes, np.zeros((3, 2)), 0.0, 2.0, np.array([0.0, 40.0]), np.array([-2.0, 2.0]))
     assert kept.ids.tolist() == [103]

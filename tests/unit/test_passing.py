@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import toy
 
 from repair.passing import open_passings
 from repair.reference import SpeedProfile
 from repair.types import LateralBounds, Maneuver, Side, frozen
-from tests import toy
 
 MARGIN = 0.1
 # The way that comes closest where none is open is added at this cost; it may collide.
@@ -18,7 +18,16 @@ NOT_OPEN = 1e3
 STRAIGHT = (np.array([0.0, 500.0]), np.array([0.0, 0.0]))
 
 
-def ways(*boxes, v0=10.0, t_rep=0.0, t_end=5.0, bounds=toy.WIDE, lateral=True, limits=toy.LIMITS, curvature=STRAIGHT):
+def ways(
+    *boxes,
+    v0=10.0,
+    t_rep=0.0,
+    t_end=5.0,
+    bounds=toy.WIDE,
+    lateral=True,
+    limits=toy.LIMITS,
+    curvature=STRAIGHT,
+):
     """All passings, by manoeuvre."""
     obstacles = toy.occupancy(*boxes)
     t = t_rep + toy.DT * np.arange(round((t_end - t_rep) / toy.DT) + 1)
@@ -55,7 +64,12 @@ def check(passing, obstacles, start, limits):
             low, high = obstacles.lower[j, k], obstacles.upper[j, k]
             if np.isnan(low[0]):
                 continue
-            room = {Side.BEHIND: low[0] - s, Side.AHEAD: s - high[0], Side.LEFT: l - high[1], Side.RIGHT: low[1] - l}
+            room = {
+                Side.BEHIND: low[0] - s,
+                Side.AHEAD: s - high[0],
+                Side.LEFT: l - high[1],
+                Side.RIGHT: low[1] - l,
+            }
             assert max(room.values()) >= MARGIN - 1e-9, (passing.maneuver, t, j)
             assert room[Side(passing.side[j, i])] >= MARGIN - 1e-9
     fine = guide.t[0] + np.arange(0.0, guide.t[-1] - guide.t[0], 0.01)
@@ -64,8 +78,10 @@ def check(passing, obstacles, start, limits):
     depth = np.minimum(position - lower, upper - position).min(axis=2)
     # between two guide times a corner can be cut, by no more than half of what the two move against
     # each other in a step
-    speeds = [np.abs(np.diff(corner, axis=1)).max(initial=0.0, where=np.isfinite(np.diff(corner, axis=1)))
-              for corner in (obstacles.lower, obstacles.upper)]  # fmt: skip
+    speeds = [
+        np.abs(np.diff(corner, axis=1)).max(initial=0.0, where=np.isfinite(np.diff(corner, axis=1)))
+        for corner in (obstacles.lower, obstacles.upper)
+    ]
     step = max(speeds) + np.abs(np.diff(guide.position, axis=0)).max()
     assert np.nanmax(depth, initial=-np.inf) <= 0.5 * step
 
@@ -84,26 +100,36 @@ def test_nothing_in_the_way_is_following():
 
 def test_static_block_with_room_on_both_sides():
     found = ways(BLOCK)
-    assert {m for m, p in found.items() if p.cost < NOT_OPEN} == {Maneuver.YIELD, Maneuver.LEFT, Maneuver.RIGHT}
+    assert {m for m, p in found.items() if p.cost < NOT_OPEN} == {
+        Maneuver.YIELD,
+        Maneuver.LEFT,
+        Maneuver.RIGHT,
+    }
     assert found[Maneuver.LEFT].guide.position[-1, 1] > 1.0
     assert found[Maneuver.RIGHT].guide.position[-1, 1] < -1.0
     assert found[Maneuver.YIELD].guide.position[-1, 0] < 40.0
     passed = found[Maneuver.LEFT].guide.position[:, 0] > 40.0
-    assert (found[Maneuver.LEFT].side[0, passed & (found[Maneuver.LEFT].guide.position[:, 0] < 47.0)] == Side.LEFT).all()
+    assert (
+        found[Maneuver.LEFT].side[0, passed & (found[Maneuver.LEFT].guide.position[:, 0] < 47.0)] == Side.LEFT
+    ).all()
     assert (found[Maneuver.YIELD].side[0] == Side.BEHIND).all()
 
 
 @pytest.mark.parametrize(
-    ("bounds", "expected"),
+    "bounds, expected",
     [
         (toy.NARROW, set()),
         (LateralBounds(frozen([0.0, 500.0]), frozen([-0.5, -0.5]), frozen([6.0, 6.0])), {Maneuver.LEFT}),
         (LateralBounds(frozen([0.0, 500.0]), frozen([-6.0, -6.0]), frozen([0.5, 0.5])), {Maneuver.RIGHT}),
         # the road narrows beside the block
-        (LateralBounds(frozen([0.0, 38.0, 40.0, 500.0]), frozen([-6.0, -6.0, -0.5, -0.5]), frozen([6.0] * 4)),
-         {Maneuver.LEFT}),
+        (
+            LateralBounds(
+                frozen([0.0, 38.0, 40.0, 500.0]), frozen([-6.0, -6.0, -0.5, -0.5]), frozen([6.0] * 4)
+            ),
+            {Maneuver.LEFT},
+        ),
     ],
-)  # fmt: skip
+)
 def test_only_where_there_is_room_beside_it(bounds, expected):
     assert open_ways(BLOCK, bounds=bounds) == expected | {Maneuver.YIELD}
 
@@ -151,7 +177,10 @@ def test_closing_gap_is_not_open():
     only = next(iter(found.values()))
     assert only.cost >= NOT_OPEN
     assert only.guide.position[-1, 0] < 25.0 * 5.0
-    left, right = toy.box((10.0, 400.0), (4.0, 9.0), v=(0.0, -4.0)), toy.box((10.0, 400.0), (-9.0, -4.0), v=(0.0, 4.0))
+    left, right = (
+        toy.box((10.0, 400.0), (4.0, 9.0), v=(0.0, -4.0)),
+        toy.box((10.0, 400.0), (-9.0, -4.0), v=(0.0, 4.0)),
+    )
     assert open_ways(left, right, v0=25.0) == set()
 
 
@@ -190,7 +219,9 @@ def test_later_start_times_are_the_same_problem():
     late = ways(block, t_rep=1.0, t_end=6.0)
     assert early.keys() == late.keys()
     for maneuver, passing in early.items():
-        np.testing.assert_allclose(passing.guide.position + [shifted, 0.0], late[maneuver].guide.position, atol=1e-6)
+        np.testing.assert_allclose(
+            passing.guide.position + np.array([shifted, 0.0]), late[maneuver].guide.position, atol=1e-6
+        )
         np.testing.assert_allclose(late[maneuver].guide.t, passing.guide.t + 1.0)
 
 
@@ -203,18 +234,29 @@ def test_side_at_is_that_of_the_nearest_guide_time():
 
 
 boxes = st.tuples(
-    st.floats(3.0, 60.0), st.floats(1.0, 12.0), st.floats(-8.0, 6.0), st.floats(0.5, 5.0),
-    st.floats(-12.0, 12.0), st.floats(-5.0, 5.0), st.floats(0.0, 2.0), st.floats(0.3, 9.0),
-)  # fmt: skip
+    st.floats(3.0, 60.0),
+    st.floats(1.0, 12.0),
+    st.floats(-8.0, 6.0),
+    st.floats(0.5, 5.0),
+    st.floats(-12.0, 12.0),
+    st.floats(-5.0, 5.0),
+    st.floats(0.0, 2.0),
+    st.floats(0.3, 9.0),
+)
 
 
 @given(st.lists(boxes, max_size=4), st.floats(0.0, 20.0), st.booleans(), st.sampled_from([1.0, 3.0, 5.0]))
 def test_every_open_guide_is_free_and_on_the_side_it_says(rows, v0, lateral, t_end):
     """``ways`` checks every passing by brute force."""
     found = ways(
-        *(toy.box((s, s + a), (l, l + b), v=(vs, vl), present=(round(begin, 1), begin + stay))
-          for s, a, l, b, vs, vl, begin, stay in rows), v0=v0, t_end=t_end, lateral=lateral,  # noqa: E741
-    )  # fmt: skip
+        *(
+            toy.box((s, s + a), (l, l + b), v=(vs, vl), present=(round(begin, 1), begin + stay))
+            for s, a, l, b, vs, vl, begin, stay in rows  # noqa: E741
+        ),
+        v0=v0,
+        t_end=t_end,
+        lateral=lateral,
+    )
     assert found  # at least the way that comes closest
     if not lateral:
         assert found.keys() <= {Maneuver.YIELD, Maneuver.GO_AHEAD}

@@ -30,13 +30,15 @@ def second_derivative(function, x, step=1e-5):
 
 @pytest.mark.parametrize("joint", [0.3, 1.0, 4.2])
 def test_collision_penalty_is_the_papers(joint):
-    excess = np.array([-2.0, -1e-9, 0.0, 0.1 * joint, joint - 1e-9, joint, joint + 1e-9, 2.0 * joint, 40.0 * joint])
+    excess = np.array(
+        [-2.0, -1e-9, 0.0, 0.1 * joint, joint - 1e-9, joint, joint + 1e-9, 2.0 * joint, 40.0 * joint]
+    )
     value, slope = cubic_quadratic(excess, joint)
     np.testing.assert_allclose(value, [literal.j_c(c, joint) for c in excess], rtol=1e-12)
     np.testing.assert_allclose(slope, [literal.j_c_slope(c, joint) for c in excess], rtol=1e-12)
 
 
-@pytest.mark.parametrize(("c_m", "factor", "elastic"), [(10.0, 1.5, 0.95), (0.5, 1.1, 0.8), (3.0, 4.0, 0.99)])
+@pytest.mark.parametrize("c_m, factor, elastic", [(10.0, 1.5, 0.95), (0.5, 1.1, 0.8), (3.0, 4.0, 0.99)])
 def test_derived_constants_close_the_joints_twice_differentiably(c_m, factor, elastic):
     c_j, m = factor * c_m, elastic * c_m
     a1, b1, c1, a2, b2, c2 = literal.coefficients(c_m, c_j, elastic)
@@ -50,13 +52,15 @@ def test_derived_constants_close_the_joints_twice_differentiably(c_m, factor, el
     assert 2 * a1 == pytest.approx(6 * (c_j - m), rel=1e-12)
 
 
-@pytest.mark.parametrize(("c_m", "factor", "elastic"), [(10.0, 1.5, 0.95), (0.5, 1.1, 0.8), (3.0, 4.0, 0.99)])
+@pytest.mark.parametrize("c_m, factor, elastic", [(10.0, 1.5, 0.95), (0.5, 1.1, 0.8), (3.0, 4.0, 0.99)])
 def test_feasibility_penalty_is_the_papers_with_these_constants(c_m, factor, elastic):
     c_j, m = factor * c_m, elastic * c_m
     c_r = np.array([-3 * c_j, -c_j, -0.5 * (c_j + m), -m, 0.0, m, 0.5 * (c_j + m), c_j, 3 * c_j])
     above, slope_above = cubic_quadratic(c_r - m, c_j - m)
     below, slope_below = cubic_quadratic(-m - c_r, c_j - m)
-    np.testing.assert_allclose(above + below, [literal.f(c, c_m, c_j, elastic) for c in c_r], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        above + below, [literal.f(c, c_m, c_j, elastic) for c in c_r], rtol=1e-9, atol=1e-12
+    )
     slope = [literal.f_slope(c, c_m, c_j, elastic) for c in c_r]
     np.testing.assert_allclose(slope_above - slope_below, slope, rtol=1e-9, atol=1e-12)
 
@@ -80,7 +84,9 @@ def test_penalty_slope_by_finite_differences():
     rng = np.random.default_rng(0)
     excess, joint = rng.uniform(-2.0, 6.0, 400), rng.uniform(0.1, 3.0, 400)
     step = 1e-6
-    numeric = (cubic_quadratic(excess + step, joint)[0] - cubic_quadratic(excess - step, joint)[0]) / (2.0 * step)
+    numeric = (cubic_quadratic(excess + step, joint)[0] - cubic_quadratic(excess - step, joint)[0]) / (
+        2.0 * step
+    )
     np.testing.assert_allclose(cubic_quadratic(excess, joint)[1], numeric, rtol=1e-6, atol=1e-8)
 
 
@@ -115,7 +121,9 @@ def test_feasibility_gradient_by_finite_differences(n, scale):
             moved = derivatives.copy()
             moved[r, axis] += sign * step
             ends.append(feasibility.evaluate(moved)[0])
-        assert slope[r, axis] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=2e-5, abs=1e-4 + 1e-9 * ends[0])
+        assert slope[r, axis] == pytest.approx(
+            (ends[0] - ends[1]) / (2 * step), rel=2e-5, abs=1e-4 + 1e-9 * ends[0]
+        )
 
 
 def test_nothing_is_charged_within_the_elastic_limits():

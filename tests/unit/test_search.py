@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests import toy
 
 from repair.config import Config, SearchConfig
 from repair.search import probe_order, search_f_ttr
@@ -22,7 +23,6 @@ from repair.types import (
     Verdict,
     Violation,
 )
-from tests import toy
 
 
 @dataclass
@@ -34,7 +34,9 @@ class FakeSource:
 
     def at(self, t_rep):
         self.asked.append(t_rep)
-        return tuple(toy.problem((), t_rep=t_rep, t_end=t_rep + 2.0, passing=self.passing(m)) for m in self.maneuvers)
+        return tuple(
+            toy.problem((), t_rep=t_rep, t_end=t_rep + 2.0, passing=self.passing(m)) for m in self.maneuvers
+        )
 
     @staticmethod
     def passing(maneuver):
@@ -72,7 +74,9 @@ class FakeChecker:
     yes: object
 
     def check(self, problem, curve):
-        return Verdict() if self.yes(problem) else Verdict((Violation(Reason.COLLISION, problem.t_rep + 0.3),))
+        return (
+            Verdict() if self.yes(problem) else Verdict((Violation(Reason.COLLISION, problem.t_rep + 0.3),))
+        )
 
 
 class BentClock:
@@ -92,12 +96,18 @@ def until(latest):
     return FakeChecker(lambda problem: problem.t_rep <= latest + 1e-9)
 
 
-def search(checker, ttc=2.9, *, backend=None, source=None, on_probe=None, clock=None, conflict=None, **settings):
+def search(
+    checker, ttc=2.9, *, backend=None, source=None, on_probe=None, clock=None, conflict=None, **settings
+):
     keys = {"on_probe": on_probe} | ({"clock": clock} if clock else {})
     return search_f_ttr(
-        source or FakeSource(), conflict or Conflict(ttc, "margin", 7, ttc + 0.05), backend or FakeBackend(), checker,
-        SearchConfig(**settings), **keys,
-    )  # fmt: skip
+        source or FakeSource(),
+        conflict or Conflict(ttc, "margin", 7, ttc + 0.05),
+        backend or FakeBackend(),
+        checker,
+        SearchConfig(**settings),
+        **keys,
+    )
 
 
 def visited(result):
@@ -156,7 +166,12 @@ def test_no_rule_reaches_the_conflict_or_asks_twice(rule, delta_t, ttc):
 @pytest.mark.parametrize("steps", [1, 2, 3, 4, 7, 12, 29])
 def test_the_grid_does_not_depend_on_rounding(delta_t, steps):
     """k * delta_t is outside of [0, k * delta_t) however the product was rounded."""
-    for ttc in (steps * delta_t, np.nextafter(steps * delta_t, 0.0), np.nextafter(steps * delta_t, 99.0), sum([delta_t] * steps)):
+    for ttc in (
+        steps * delta_t,
+        np.nextafter(steps * delta_t, 0.0),
+        np.nextafter(steps * delta_t, 99.0),
+        sum([delta_t] * steps),
+    ):
         assert visited(search(until(99.0), ttc, rule="scan", delta_t=delta_t)) == pytest.approx(
             [k * delta_t for k in range(steps)]
         )
@@ -255,10 +270,13 @@ def test_no_open_manoeuvre_is_a_verdict():
 
 
 @pytest.mark.parametrize(
-    ("status", "reason"),
-    [(SolveStatus.INFEASIBLE, Reason.NOT_SOLVED), (SolveStatus.NO_CORRIDOR, Reason.NO_CORRIDOR),
-     (SolveStatus.NUMERICAL_ERROR, Reason.NOT_SOLVED)],
-)  # fmt: skip
+    "status, reason",
+    [
+        (SolveStatus.INFEASIBLE, Reason.NOT_SOLVED),
+        (SolveStatus.NO_CORRIDOR, Reason.NO_CORRIDOR),
+        (SolveStatus.NUMERICAL_ERROR, Reason.NOT_SOLVED),
+    ],
+)
 def test_what_the_solver_could_not_do_is_not_the_checkers_no(status, reason):
     result = search(until(9.0), backend=FakeBackend(status=status))
     probe = result.probes[0]

@@ -111,7 +111,9 @@ def repair_at_ttr(
     if best.feasible:
         found = SearchResult(SearchStatus.FOUND, conflict, best.t_rep, best.solve.curve, (best,), True, wall)
         return AtTtrResult(evasive, found)
-    return AtTtrResult(evasive, SearchResult(SearchStatus.NONE_FEASIBLE, conflict, None, None, (best,), True, wall))
+    return AtTtrResult(
+        evasive, SearchResult(SearchStatus.NONE_FEASIBLE, conflict, None, None, (best,), True, wall)
+    )
 
 
 def _answer(probe: Probe) -> str:

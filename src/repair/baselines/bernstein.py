@@ -151,14 +151,24 @@ def _joints(pieces: int, degree: int, continuity: int) -> Array:
 
 @lru_cache(maxsize=64)
 def qp_structure(
-    pieces: int, degree: int, duration: float, continuity: int, w_jerk: float, w_deviation: float
+    pieces: int,
+    degree: int,
+    duration: float,
+    continuity: int,
+    w_jerk: float,
+    w_deviation: float,
+    settles: bool = False,
 ) -> QpStructure:
-    """Structure for one axis, objective ``w_jerk * int(jerk**2) + w_deviation * int((x - ref)**2)``."""
+    """Structure for one axis, objective ``w_jerk * int(jerk**2) + w_deviation * int((x - ref)**2)``.
+
+    With ``settles`` the speed and the acceleration at the end are zero.
+    """
     width = degree + 1
     derivatives = tuple(_derivative(pieces, degree, duration, k) for k in range(4))
     start = np.vstack([derivatives[k][:1] for k in range(3)])
     joints = _joints(pieces, degree, continuity)
-    fixed = np.vstack([start, joints])
+    end = np.vstack([derivatives[k][-1:] for k in (1, 2)]) if settles else np.empty((0, pieces * width))
+    fixed = np.vstack([start, joints, end])
     lift = np.linalg.pinv(fixed)[:, :3]
     null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
 
@@ -167,7 +177,9 @@ def qp_structure(
     weights = np.tile(0.5 * duration * node_weights, pieces)
     at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
     jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
-    hessian = 2.0 * (w_jerk * jerk.T @ (weights[:, None] * jerk) + w_deviation * at_nodes.T @ (weights[:, None] * at_nodes))
+    hessian = 2.0 * (
+        w_jerk * jerk.T @ (weights[:, None] * jerk) + w_deviation * at_nodes.T @ (weights[:, None] * at_nodes)
+    )
     factor = np.linalg.cholesky(null.T @ hessian @ null)
     basis = np.linalg.solve(factor, null.T).T
     piece = np.arange(pieces)[:, None]

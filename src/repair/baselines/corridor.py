@@ -122,7 +122,12 @@ def _walls(
     lower, upper = problem.occupancy.at(times)
     lower, upper = lower - problem.margin, upper + problem.margin
     room = np.stack(
-        [lower[..., 0] - guide[:, 0], guide[:, 0] - upper[..., 0], guide[:, 1] - upper[..., 1], lower[..., 1] - guide[:, 1]]
+        [
+            lower[..., 0] - guide[:, 0],
+            guide[:, 0] - upper[..., 0],
+            guide[:, 1] - upper[..., 1],
+            lower[..., 1] - guide[:, 1],
+        ]
     )  # in the order of Side
     present = np.isfinite(room).all(axis=0)
     if not problem.lateral:
@@ -158,7 +163,9 @@ def _line_below(t: Array, values: Array, guide: Array) -> Array:
     if np.ptp(values) < 1e-9:
         return np.array([values[0], values[-1]])
     i, j = np.triu_indices(len(t), k=1)
-    slope = np.concatenate([(values[j] - values[i]) / (t[j] - t[i]), np.full(len(t), (guide[-1] - guide[0]) / (t[-1] - t[0]))])
+    slope = np.concatenate(
+        [(values[j] - values[i]) / (t[j] - t[i]), np.full(len(t), (guide[-1] - guide[0]) / (t[-1] - t[0]))]
+    )
     base = np.concatenate([i, np.arange(len(t))])
     lines = values[base][:, None] + slope[:, None] * (t[None, :] - t[base][:, None])
     below = (lines <= values + _TOLERANCE).all(axis=1)
@@ -191,12 +198,27 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
     stop = np.minimum(tau, speed / braking)
     nearest = start[0] + speed * stop - 0.5 * braking * stop**2
     # Two neighbours share their joint's control point, so both must have room for it.
-    s_low = np.concatenate([corridor.s_lower[:1, 0], np.maximum(corridor.s_lower[:-1, 1], corridor.s_lower[1:, 0]), corridor.s_lower[-1:, 1]])
-    s_high = np.concatenate([corridor.s_upper[:1, 0], np.minimum(corridor.s_upper[:-1, 1], corridor.s_upper[1:, 0]), corridor.s_upper[-1:, 1]])
+    s_low = np.concatenate(
+        [
+            corridor.s_lower[:1, 0],
+            np.maximum(corridor.s_lower[:-1, 1], corridor.s_lower[1:, 0]),
+            corridor.s_lower[-1:, 1],
+        ]
+    )
+    s_high = np.concatenate(
+        [
+            corridor.s_upper[:1, 0],
+            np.minimum(corridor.s_upper[:-1, 1], corridor.s_upper[1:, 0]),
+            corridor.s_upper[-1:, 1],
+        ]
+    )
     if (corridor.l_lower > corridor.l_upper + _TOLERANCE).any():
         i = int(np.argmax(corridor.l_lower - corridor.l_upper))
         raise NoCorridor(f"no room sideways between t = {edges[i]:.2f} s and {edges[i + 1]:.2f} s")
-    low, high = np.maximum(corridor.l_lower[:-1], corridor.l_lower[1:]), np.minimum(corridor.l_upper[:-1], corridor.l_upper[1:])
+    low, high = (
+        np.maximum(corridor.l_lower[:-1], corridor.l_lower[1:]),
+        np.minimum(corridor.l_upper[:-1], corridor.l_upper[1:]),
+    )
     if (low > high + _TOLERANCE).any():
         i = int(np.argmax(low - high))
         raise NoCorridor(f"the pieces that meet at t = {edges[i + 1]:.2f} s have no l in common")
@@ -205,8 +227,13 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
         raise NoCorridor(f"no room along the path at t = {edges[i]:.2f} s")
     if not s_low[0] - _TOLERANCE <= start[0] <= s_high[0] + _TOLERANCE:
         raise NoCorridor(f"the start is {start[0] - s_high[0]:.2f} m beyond the first trapezoid")
-    if problem.lateral and not corridor.l_lower[0] - _TOLERANCE <= start[1] <= corridor.l_upper[0] + _TOLERANCE:
+    if (
+        problem.lateral
+        and not corridor.l_lower[0] - _TOLERANCE <= start[1] <= corridor.l_upper[0] + _TOLERANCE
+    ):
         raise NoCorridor("the start lies beside the first piece of the corridor")
     if (nearest > s_high + 1e-3).any():
         i = int(np.argmax(nearest > s_high + 1e-3))
-        raise NoCorridor(f"at t = {edges[i]:.2f} s even full braking is {nearest[i] - s_high[i]:.2f} m beyond the corridor")
+        raise NoCorridor(
+            f"at t = {edges[i]:.2f} s even full braking is {nearest[i] - s_high[i]:.2f} m beyond the corridor"
+        )

@@ -182,11 +182,15 @@ def _uniform(status: EvasiveStatus) -> EvasiveResult:
     return EvasiveResult(value, value, value, value, value, None, dict.fromkeys(EvasiveManeuver, status))
 
 
-def _escape(prepared: Prepared, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float) -> EvasiveCurve | None:
+def _escape(
+    prepared: Prepared, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float
+) -> EvasiveCurve | None:
     """The first variant of a manoeuvre from ``t`` on that is free until the end of the repairs."""
     steering = maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT)
     road = steering or prepared.conflict.kind == "off_road"
-    for curve in maneuvers_at(prepared.reference, t, prepared.t_end, maneuver, settings, prepared.scene.vehicle):
+    for curve in maneuvers_at(
+        prepared.reference, t, prepared.t_end, maneuver, settings, prepared.scene.vehicle
+    ):
         if _is_free(prepared, curve, settings.collision, road):
             return curve
     return None
@@ -251,7 +255,9 @@ def _path_of(reference: Curve, t_end: float) -> tuple[Array, Array]:
     return frozen(s), frozen(points[index, 1])
 
 
-def _kick_down(s: float, v: float, duration: float, a_kick: float, vehicle: Vehicle) -> list[tuple[float, ...]]:
+def _kick_down(
+    s: float, v: float, duration: float, a_kick: float, vehicle: Vehicle
+) -> list[tuple[float, ...]]:
     """Full throttle: ``a_kick`` as far as the engine goes (power limit above v_switch, top speed)."""
     phases, t = [], 0.0
     while t < duration - 1e-9:

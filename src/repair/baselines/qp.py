@@ -43,7 +43,9 @@ class QpAnswer(NamedTuple):
     detail: str
 
 
-def solve_projection(origin: Array, rows: Array, limit: Array, solver: str, time_limit: float | None = None) -> QpAnswer:
+def solve_projection(
+    origin: Array, rows: Array, limit: Array, solver: str, time_limit: float | None = None
+) -> QpAnswer:
     """The point next to ``origin`` with ``rows @ z <= limit``.
 
     Parameters
@@ -67,7 +69,9 @@ def solve_projection(origin: Array, rows: Array, limit: Array, solver: str, time
     try:
         solution = _call(rows, room, solver, time_limit)
     except Exception as error:  # the solvers' own exceptions have no common base
-        return QpAnswer(SolveStatus.NUMERICAL_ERROR, None, np.inf, f"{solver}: {type(error).__name__}: {error}")
+        return QpAnswer(
+            SolveStatus.NUMERICAL_ERROR, None, np.inf, f"{solver}: {type(error).__name__}: {error}"
+        )
     word = _word(solution)
     z = None
     if solution.x is not None and np.isfinite(solution.x).all():
@@ -79,9 +83,13 @@ def solve_projection(origin: Array, rows: Array, limit: Array, solver: str, time
         return QpAnswer(SolveStatus.TIME_LIMIT, None, violation, f"{solver}: time limit of {time_limit:g} s")
     gap = infeasibility(rows, room)
     if gap > FEASIBLE:
-        return QpAnswer(SolveStatus.INFEASIBLE, None, gap, f"{solver}: {word}; the constraints have no common point")
+        return QpAnswer(
+            SolveStatus.INFEASIBLE, None, gap, f"{solver}: {word}; the constraints have no common point"
+        )
     detail = f"{solver}: {word}, although the constraints have a common point"
-    return QpAnswer(SolveStatus.ITERATION_LIMIT if "max" in word else SolveStatus.NUMERICAL_ERROR, None, violation, detail)
+    return QpAnswer(
+        SolveStatus.ITERATION_LIMIT if "max" in word else SolveStatus.NUMERICAL_ERROR, None, violation, detail
+    )
 
 
 def _call(rows: Array, room: Array, solver: str, time_limit: float | None) -> Any:
@@ -98,14 +106,20 @@ def _call(rows: Array, room: Array, solver: str, time_limit: float | None) -> An
         hessian, matrix = csc_matrix(hessian), csc_matrix(rows)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a failure is told by the status, not by a warning
-        return solve_problem(Problem(hessian, np.zeros(rows.shape[1]), matrix, room.copy()), solver=solver, **settings)
+        return solve_problem(
+            Problem(hessian, np.zeros(rows.shape[1]), matrix, room.copy()), solver=solver, **settings
+        )
 
 
 def _word(solution: Any) -> str:
     """The solver's own status word, as far as qpsolvers passes it on."""
     extras = solution.extras or {}
     info = extras.get("info")
-    word = getattr(info, "status", None) or extras.get("status") or ("solved" if solution.found else "no solution")
+    word = (
+        getattr(info, "status", None)
+        or extras.get("status")
+        or ("solved" if solution.found else "no solution")
+    )
     return str(word).lower()
 
 

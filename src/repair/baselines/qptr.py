@@ -29,8 +29,9 @@ _START = 1e-4  # by how much the start's own control points may break a bound (m
 
 @dataclass(frozen=True)
 class _Axis:
-    """One axis of the QP: control points x = offset + basis @ z, rows @ z <= limit."""
+    """One axis of the QP: control points x = offset + structure.basis @ z, rows @ z <= limit."""
 
+    structure: QpStructure
     origin: Array
     rows: Array
     limit: Array
@@ -79,7 +80,9 @@ class QptrBackend:
         begin = time.perf_counter()
         duration = problem.t_end - problem.t_rep
         if not duration > 0.0:
-            raise BackendError(f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration")
+            raise BackendError(
+                f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration"
+            )
         pieces = max(1, int(np.ceil(duration / self.config.spacing - 1e-9)))
         edges = problem.t_rep + duration / pieces * np.arange(pieces + 1)
         try:
@@ -87,11 +90,7 @@ class QptrBackend:
         except NoCorridor as closed:
             spent = time.perf_counter() - begin
             return SolveResult(SolveStatus.NO_CORRIDOR, build_time=spent, detail=str(closed))
-        structure = qp_structure(
-            pieces, self.config.degree, duration / pieces, self.config.continuity,
-            self.config.w_jerk, self.config.w_deviation,
-        )  # fmt: skip
-        axes = self._axes(problem, structure, corridor)
+        axes = [self._axis(problem, corridor, axis) for axis in range(2 if problem.lateral else 1)]
         built = time.perf_counter()
         broken = "; ".join(a.broken for a in axes if a.broken)
         if broken:
@@ -104,40 +103,49 @@ class QptrBackend:
             return SolveResult(
                 answer.status, build_time=built - begin, solve_time=solved - built, detail=answer.detail
             )
-        curve = self._curve(problem, structure, axes, answer.z)
+        curve = self._curve(problem, axes, answer.z)
         return SolveResult(
             status=answer.status,
             curve=curve,
-            objective=self._objective(problem, structure, curve),
+            objective=self._objective(problem, axes[0].structure, curve),
             build_time=built - begin,
             solve_time=solved - built,
             detail=answer.detail,
             residuals=residuals(problem, corridor, curve, self.config.continuity),
         )
 
-    def _axes(self, problem: RepairProblem, structure: QpStructure, corridor: Corridor) -> list[_Axis]:
-        reference = problem.reference.sample(problem.t_rep + structure.nodes).position
-        low, high = corridor.control_bounds(structure.degree)
-        axes = []
-        for axis in range(2 if problem.lateral else 1):
-            # s from its start: what is left are numbers of the same size on both axes
-            shift = float(problem.start[0, 0]) if axis == 0 else 0.0
-            start = problem.start[:, axis] - [shift, 0.0, 0.0]
-            offset = structure.lift @ start
-            pull = 2.0 * self.config.w_deviation * structure.at_nodes.T @ (structure.weights * (reference[:, axis] - shift))
-            lower, upper = _derivative_bounds(problem.limits, structure, axis)
-            lower[0], upper[0] = low[..., axis].ravel() - shift, high[..., axis].ravel() - shift
-            rows, limit, broken = _rows(structure, offset, lower, upper, "sl"[axis])
-            axes.append(_Axis(-structure.basis.T @ (structure.hessian @ offset - pull), rows, limit, offset, broken))
-        return axes
+    def _structure(self, edges: Array, axis: int) -> QpStructure:
+        """Sideways the repair comes to rest, so that it ends parallel to the path; along it the end is free."""
+        c, pieces = self.config, len(edges) - 1
+        duration = float(edges[-1] - edges[0]) / pieces
+        return qp_structure(pieces, c.degree, duration, c.continuity, c.w_jerk, c.w_deviation, axis == 1)
 
-    def _curve(self, problem: RepairProblem, structure: QpStructure, axes: list[_Axis], z: Array) -> BernsteinCurve:
-        shape = (structure.pieces, structure.degree + 1)
-        m = structure.basis.shape[1]
-        columns = [a.offset + structure.basis @ z[k * m : (k + 1) * m] for k, a in enumerate(axes)]
+    def _axis(self, problem: RepairProblem, corridor: Corridor, axis: int) -> _Axis:
+        structure = self._structure(corridor.edges, axis)
+        reference = problem.reference.sample(problem.t_rep + structure.nodes).position[:, axis]
+        low, high = corridor.control_bounds(structure.degree)
+        # s from its start: what is left are numbers of the same size on both axes
+        shift = float(problem.start[0, 0]) if axis == 0 else 0.0
+        offset = structure.lift @ (problem.start[:, axis] - [shift, 0.0, 0.0])
+        pull = (
+            2.0 * self.config.w_deviation * structure.at_nodes.T @ (structure.weights * (reference - shift))
+        )
+        lower, upper = _derivative_bounds(problem.limits, structure, axis)
+        lower[0], upper[0] = low[..., axis].ravel() - shift, high[..., axis].ravel() - shift
+        rows, limit, broken = _rows(structure, offset, lower, upper, "sl"[axis])
+        origin = -structure.basis.T @ (structure.hessian @ offset - pull)
+        return _Axis(structure, origin, rows, limit, offset, broken)
+
+    def _curve(self, problem: RepairProblem, axes: list[_Axis], z: Array) -> BernsteinCurve:
+        structure, columns, used = axes[0].structure, [], 0
+        for axis in axes:
+            m = len(axis.origin)
+            columns.append(axis.offset + axis.structure.basis @ z[used : used + m])
+            used += m
         columns[0] = columns[0] + float(problem.start[0, 0])
         if not problem.lateral:
             columns.append(_reference_points(problem, structure))
+        shape = (structure.pieces, structure.degree + 1)
         points = np.stack([c.reshape(shape) for c in columns], axis=2)
         return BernsteinCurve(problem.t_rep, structure.duration, frozen(points))
 
@@ -153,7 +161,9 @@ def _reference_points(problem: RepairProblem, structure: QpStructure) -> Array:
     """Control points of l that follow the reference (least squares, exact start)."""
     lateral = problem.reference.sample(problem.t_rep + structure.nodes).position[:, 1]
     offset = structure.lift @ problem.start[:, 1]
-    fit = np.linalg.lstsq(structure.at_nodes @ structure.basis, lateral - structure.at_nodes @ offset, rcond=None)[0]
+    fit = np.linalg.lstsq(
+        structure.at_nodes @ structure.basis, lateral - structure.at_nodes @ offset, rcond=None
+    )[0]
     return np.asarray(offset + structure.basis @ fit)
 
 
@@ -184,7 +194,9 @@ def _rows(
         free = norm > _FIXED * norm.max()
         excess = np.maximum(value - upper[k], lower[k] - value)[~free].max(initial=-np.inf)
         if excess > _START:
-            broken.append(f"the start state leads {excess:.2g} out of the {what} of {name} before anything can be done")
+            broken.append(
+                f"the start state leads {excess:.2g} out of the {what} of {name} before anything can be done"
+            )
         for sign, bound in ((1.0, upper[k]), (-1.0, lower[k])):
             use = free & np.isfinite(bound)
             blocks.append(sign * structure.reach[k][use] / norm[use, None])
@@ -205,7 +217,9 @@ def _joined(axes: list[_Axis]) -> tuple[Array, Array, Array]:
     )
 
 
-def residuals(problem: RepairProblem, corridor: Corridor, curve: BernsteinCurve, continuity: int) -> dict[str, float]:
+def residuals(
+    problem: RepairProblem, corridor: Corridor, curve: BernsteinCurve, continuity: int
+) -> dict[str, float]:
     """Largest violation of every family of constraints by the control points, in their own units."""
     limits = problem.limits
     axes = slice(0, 2 if problem.lateral else 1)

@@ -7,7 +7,7 @@ times-to-repair apart in the order of a colour-blind-safe map; dashed means infe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +20,20 @@ if TYPE_CHECKING:
     from repair.api import RepairResult
     from repair.scene.obstacles import Obstacle
 
-__all__ = ["birdseye_figure", "profile_figure", "render", "stages_figure"]
+__all__ = ["birdseye_figure", "paper_figures", "profile_figure", "render", "stages_figure"]
+
+_Window = tuple[tuple[float, float], tuple[float, float]]
+"""Ranges of x and y [m]."""
 
 _WIDTH = 8.0  # in; at 150 dots per inch readable at the width of a README
 _EGO, _OBSTACLE, _REFERENCE = "#0072B2", "#D55E00", "#000000"
-_STYLE = {"axes.grid": True, "grid.alpha": 0.25, "font.size": 9.5, "axes.spines.top": False, "axes.spines.right": False}
+_STYLE: Any = {
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "font.size": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,9 @@ class _Line:
 def render(figure: Any, file_format: str = "png") -> bytes:
     """A figure as the bytes of a file (``png``, ``pdf``, ``svg``), the same bytes for the same figure."""
     buffer = BytesIO()
-    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(file_format)
+    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(
+        file_format
+    )
     figure.savefig(buffer, format=file_format, dpi=150, bbox_inches="tight", metadata=metadata)
     return buffer.getvalue()
 
@@ -80,12 +91,15 @@ def stages_figure(result: RepairResult, t_rep: float | None = None) -> Any:
     if not probes:
         raise ValueError("no probe with a curve to draw")
     probe = max(probes, key=lambda p: (p.feasible, p.t_rep))
-    curves = dict(probe.solve.stages) or {"repair": probe.solve.curve}
-    colours = (_OBSTACLE, _EGO, "#009E73", "#CC79A7")
+    curves: dict[str, Curve | None] = dict(probe.solve.stages)
+    curves = curves or {"repair": probe.solve.curve}
+    styles = ((_OBSTACLE, "-", 2.6), (_EGO, (0, (4, 2)), 1.6), ("#009E73", (0, (1, 1)), 1.6))
     lines = [_reference(result)]
-    for (name, curve), colour in zip(curves.items(), colours, strict=False):
+    for (name, curve), (colour, dashes, width) in zip(curves.items(), styles, strict=False):
         if curve is not None:
-            lines.append(_line(result, curve, probe.t_rep, name, {"color": colour, "lw": 1.8}))
+            lines.append(
+                _line(result, curve, probe.t_rep, name, {"color": colour, "ls": dashes, "lw": width})
+            )
     return _profiles(result, lines, f"{_title(result)}: stages at $t_{{rep}}$ = {probe.t_rep:g} s")
 
 
@@ -111,20 +125,54 @@ def birdseye_figure(result: RepairResult) -> Any:
             line = _probe_line(result, probe, colour)
             label = line.label if probe.feasible else f"{line.label.splitlines()[0]}, infeasible"
             axes.plot(*line.xy.T, label=label, zorder=4, **line.style)
-        _draw_vehicles(axes, result, conflict.time if np.isfinite(conflict.time) else result.prepared.t_end, window)
+        _draw_vehicles(
+            axes, result, conflict.time if np.isfinite(conflict.time) else result.prepared.t_end, window
+        )
         axes.set(
-            xlim=window[0], ylim=window[1], aspect="equal", xlabel="x [m]", ylabel="y [m]", title=_title(result)
+            xlim=window[0],
+            ylim=window[1],
+            aspect="equal",
+            xlabel="x [m]",
+            ylabel="y [m]",
+            title=_title(result),
         )
         axes.grid(visible=False)
         figure.legend(loc="outside lower center", ncols=4, frameon=False)
     return figure
 
 
+def paper_figures(backend: str = "ego", file_format: str = "png") -> dict[str, bytes]:
+    """The paper's Figures 4 and 5 (Scenario 1) and 6 (Scenario 2), computed anew.
+
+    Returns
+    -------
+    dict
+        File name to content.
+    """
+    from repair.api import repair
+    from repair.config import load_config
+    from repair.scene.bundled import paper_scenario
+
+    results = []
+    for name in ("scenario_1", "scenario_2"):
+        with paper_scenario(name) as path:
+            results.append(repair(path, load_config(name, backend=backend)))
+    drawn = {
+        "figure_4": profile_figure(results[0]),
+        "figure_5": stages_figure(results[0]),
+        "figure_6": birdseye_figure(results[1]),
+        "figure_6_profiles": profile_figure(results[1]),
+    }
+    return {f"{name}.{file_format}": render(figure, file_format) for name, figure in drawn.items()}
+
+
 # -- lines -----------------------------------------------------------------------------------------
 
 
-def _line(result: RepairResult, curve: Curve, t_rep: float | None, label: str, style: dict[str, Any]) -> _Line:
-    """Sample a curve from ``t_rep`` on (from 0 where that is None); accelerations as in :mod:`repair.metrics`."""
+def _line(
+    result: RepairResult, curve: Curve, t_rep: float | None, label: str, style: dict[str, Any]
+) -> _Line:
+    """Sample a curve from ``t_rep`` on, or from 0; accelerations as in :mod:`repair.metrics`."""
     prepared = result.prepared
     t_end = prepared.t_end if t_rep is not None else prepared.t_reference
     whole = curve if t_rep is None else SplicedCurve(prepared.reference, curve, t_rep)
@@ -139,10 +187,8 @@ def _reference(result: RepairResult) -> _Line:
     style = {"color": _REFERENCE, "lw": 1.4, "ls": ":"}
     line = _line(result, result.prepared.reference, None, "reference", style)
     shown = line.t <= _shown_until(result) + 1e-9
-    return _Line(
-        line.label, line.t[shown], line.position[shown], line.xy[shown], line.speed[shown], line.acceleration[shown],
-        style,
-    )  # fmt: skip
+    names = ("t", "position", "xy", "speed", "acceleration")
+    return replace(line, **{name: getattr(line, name)[shown] for name in names})
 
 
 def _shown_until(result: RepairResult) -> float:
@@ -156,14 +202,16 @@ def _coloured(result: RepairResult) -> list[tuple[Probe, Any]]:
     from matplotlib import colormaps
 
     probes = sorted((p for p in result.search.probes if p.solve.curve is not None), key=lambda p: p.t_rep)
-    shades = np.linspace(0.08, 0.86, max(len(probes), 2))[-len(probes) :] if probes else []
+    shades: Any = np.linspace(0.08, 0.86, max(len(probes), 2))[-len(probes) :] if probes else []
     return [(p, colormaps["viridis"](shade)) for p, shade in zip(probes, shades, strict=True)]
 
 
 def _probe_line(result: RepairResult, probe: Probe, colour: Any) -> _Line:
     assert probe.solve.curve is not None
     best = result.search.best is probe
-    verdict = " (F-TTR)" if best else "" if probe.feasible else f"\n{', '.join(probe.verdict.reasons)}".replace("_", " ")
+    verdict = " (F-TTR)" if best else ""
+    if not probe.feasible:
+        verdict = "\n" + ", ".join(probe.verdict.reasons).replace("_", " ")
     style = {"color": colour, "lw": 2.4 if best else 1.5, "ls": "-" if probe.feasible else (0, (4, 2))}
     return _line(result, probe.solve.curve, probe.t_rep, f"$t_{{rep}}$ = {probe.t_rep:g} s{verdict}", style)
 
@@ -189,12 +237,18 @@ def _profiles(result: RepairResult, lines: Sequence[_Line], title: str) -> Any:
         figure = Figure(figsize=(_WIDTH, 1.5 + 0.95 * sum(heights)), layout="constrained")
         axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         s0 = float(result.prepared.scene.start[0, 0])
-        columns = [[x.position[:, 0] - s0 for x in lines], [x.speed for x in lines], [x.acceleration for x in lines]]
+        columns = [
+            [x.position[:, 0] - s0 for x in lines],
+            [x.speed for x in lines],
+            [x.acceleration for x in lines],
+        ]
         columns += [[x.position[:, 1] for x in lines]] * sideways
         labels = ("distance driven s [m]", "speed [m/s]", "acceleration\n[m/s²]", "lateral\noffset l [m]")
         for panel, values, label in zip(axes, columns, labels, strict=False):
             for line, column in zip(lines, values, strict=True):
-                panel.plot(line.t, column, label=line.label if panel is axes[0] else None, zorder=3, **line.style)
+                panel.plot(
+                    line.t, column, label=line.label if panel is axes[0] else None, zorder=3, **line.style
+                )
                 if line.t[0] > 0.0:  # where a repair leaves the reference
                     panel.plot(line.t[0], column[0], "o", ms=4.5, color=line.style["color"], zorder=4)
             panel.set_ylabel(label)
@@ -241,7 +295,14 @@ def _draw_obstacles(panel: Any, result: RepairResult, t_end: float, s0: float) -
         middle = np.flatnonzero(seen)[seen.sum() // 2]
         height = float(np.clip(0.5 * (low[middle] + high[middle]), bottom, top))
         panel.text(
-            t[middle], height, str(int(occupancy.ids[k])), ha="center", va="center", fontsize=8, zorder=2, clip_on=True
+            t[middle],
+            height,
+            str(int(occupancy.ids[k])),
+            ha="center",
+            va="center",
+            fontsize=8,
+            zorder=2,
+            clip_on=True,
         )
 
 
@@ -257,7 +318,9 @@ def _mark_limits(axes: Any, result: RepairResult) -> None:
     for value, name in ((limits.a_min, "$a_{min}$"), (limits.a_max, "$a_{max}$")):
         if low - (high - low) <= value <= high + (high - low):
             panel.axhline(value, color="#777777", lw=1.0, ls="-.")
-            panel.annotate(f" {name}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8)
+            panel.annotate(
+                f" {name}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8
+            )
     axes[1].axhline(0.0, color="#777777", lw=1.0, ls="-.")
 
 
@@ -276,20 +339,21 @@ def _mark_times(axes: Any, result: RepairResult) -> None:
 # -- bird's-eye view -------------------------------------------------------------------------------
 
 
-def _window(result: RepairResult, reference: _Line) -> tuple[tuple[tuple[float, float], tuple[float, float]], float]:
+def _window(result: RepairResult, reference: _Line) -> tuple[_Window, float]:
     """Ranges of x and y that hold all that is driven with some room, and their ratio of height to width."""
     points = np.vstack([reference.xy, np.column_stack([result.states.x, result.states.y])])
     low, high = points.min(axis=0) - 10.0, points.max(axis=0) + 10.0
     size, centre = high - low, 0.5 * (low + high)
     shape = float(np.clip(size[1] / size[0], 0.3, 0.75))
     width = max(size[0], size[1] / shape)
-    (x0, y0), (x1, y1) = centre - 0.5 * width * np.array([1, shape]), centre + 0.5 * width * np.array([1, shape])
+    (x0, y0), (x1, y1) = (
+        centre - 0.5 * width * np.array([1, shape]),
+        centre + 0.5 * width * np.array([1, shape]),
+    )
     return ((float(x0), float(x1)), (float(y0), float(y1))), shape
 
 
-def _draw_vehicles(
-    axes: Any, result: RepairResult, at: float, window: tuple[tuple[float, float], tuple[float, float]]
-) -> None:
+def _draw_vehicles(axes: Any, result: RepairResult, at: float, window: _Window) -> None:
     """Everybody at the time of the conflict; the ego and its opponent at a few times before and after it."""
     prepared, scene, dt = result.prepared, result.prepared.scene, result.prepared.scene.dt
     moment, end = round(at / dt), round(_shown_until(result) / dt)
@@ -319,7 +383,9 @@ def _draw_vehicles(
         driven = driven.every(prepared.config.checker.substeps)
         if moment < len(driven):
             ghost = _placed(body, driven.x[moment], driven.y[moment], driven.orientation[moment])
-            axes.fill(*ghost.T, fill=False, ec=_REFERENCE, ls="--", zorder=5, label=f"ego unrepaired, {at:.3g} s")
+            axes.fill(
+                *ghost.T, fill=False, ec=_REFERENCE, ls="--", zorder=5, label=f"ego unrepaired, {at:.3g} s"
+            )
     axes.fill([], [], color=_EGO, alpha=0.75, label=f"ego (dark: {at:.3g} s)")
     if opponent is not None:
         axes.fill([], [], color=_OBSTACLE, alpha=0.75, label=f"obstacle {opponent} (dark: {at:.3g} s)")
@@ -330,7 +396,7 @@ def _draw_vehicles(
 class _Labels:
     """Times written on vehicles, left out where they would cover an earlier one."""
 
-    def __init__(self, axes: Any, apart: float, window: Sequence[Sequence[float]]) -> None:
+    def __init__(self, axes: Any, apart: float, window: _Window) -> None:
         self.axes, self.apart, self.window, self.taken = axes, apart, window, []  # type: ignore[var-annotated]
 
     def add(self, text: str, at: Array) -> None:

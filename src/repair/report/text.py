@@ -95,14 +95,17 @@ def _extremes(content: dict[str, Any]) -> str:
 def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
     head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_lat", "v_min", "solver", "solve", "check")
     units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
-    table = [head, units]
+    table: list[tuple[str, ...]] = [head, units]
     for p in probes:
         table.append(
             (
                 f"{p['t_rep_s']:.2f}",
                 "feasible" if p["feasible"] else ", ".join(p["reasons"]),
                 (p["maneuver"] or "-").replace("_", " "),
-                *(_fixed(p[k]) for k in ("peak_deceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps")),
+                *(
+                    _fixed(p[k])
+                    for k in ("peak_deceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps")
+                ),
                 f"{p['solver_status']}, {p['iterations']} it.",
                 f"{1e3 * p['solve_time_s']:.1f}",
                 f"{1e3 * p['check_time_s']:.1f}",
@@ -111,11 +114,12 @@ def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
     widths = [max(len(row[k]) for row in table) for k in range(len(head))]
     numbers = {0, 3, 4, 5, 7, 8}
     lines = [
-        "  ".join(cell.rjust(w) if k in numbers else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths)))
+        "  ".join(c.rjust(widths[k]) if k in numbers else c.ljust(widths[k]) for k, c in enumerate(row))
         for row in table
     ]
     details = [
-        f"  {p['t_rep_s']:.2f} s: {d['reason']} at {d['t_s']:.2f} s{': ' + d['detail'] if d['detail'] else ''}"
+        f"  {p['t_rep_s']:.2f} s: {d['reason']} at {d['t_s']:.2f} s"
+        + (f": {d['detail']}" if d["detail"] else "")
         for p in probes
         if not p["feasible"]
         for d in p["details"]
@@ -155,13 +159,15 @@ def configuration_keys() -> list[Key]:
         keys = []
         for item in fields(section):
             name = f"{prefix}{item.name}"
-            value = item.default_factory() if item.default is MISSING else item.default  # type: ignore[misc]
+            value = item.default if item.default_factory is MISSING else item.default_factory()
             if is_dataclass(value):
                 keys += walk(type(value), f"{name}.")
                 continue
             line = re.search(rf"^    {item.name}:[^#\n]*(?:#\s*(.*))?$", source, re.MULTILINE)
             meaning = (line.group(1) if line else None) or ""
-            default = "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+            default = (
+                "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+            )
             keys.append(Key(name, str(item.type).replace(" | None", " or null"), default, meaning))
         return keys
 
@@ -181,7 +187,9 @@ def key_table() -> str:
         elif key.name in RANGES:
             low, high = RANGES[key.name]
             possible = f"{low:g} to {high:g}" + (" or null" if key.type.endswith("null") else "")
-        lines.append(f"| `{key.name}` | `{key.default}` | {possible} | {meaning.replace('|', chr(92) + '|')} |")
+        lines.append(
+            f"| `{key.name}` | `{key.default}` | {possible} | {meaning.replace('|', chr(92) + '|')} |"
+        )
     return "\n".join(lines)
 
 
@@ -189,6 +197,8 @@ def preset_summary(name: str) -> str:
     """The comment at the head of a preset's file."""
     import repair.config
 
-    lines = (Path(repair.config.__file__).with_name("presets") / f"{name}.yaml").read_text("utf-8").splitlines()
+    lines = (
+        (Path(repair.config.__file__).with_name("presets") / f"{name}.yaml").read_text("utf-8").splitlines()
+    )
     head = list(takewhile(lambda line: line.startswith("#"), lines))
     return " ".join(line.lstrip("# ") for line in head)

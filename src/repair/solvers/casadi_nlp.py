@@ -37,6 +37,9 @@ __all__ = ["CasadiBackend", "make"]
 TOLERANCE = 1e-6  # largest violation of a curve that is called solved
 _TIGHTEN = 1e-7  # bounds are taken in by this much, so that the solver's own tolerance stays inside
 _INF = np.inf
+_TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
+_SIDES = 4  # sets of sides that are tried
+_ROAD_SLACK = 0.5  # [m] of s either way of the guide over which the road must be wide enough
 
 _STATUS = {
     "Solve_Succeeded": SolveStatus.SOLVED,
@@ -101,6 +104,7 @@ class CasadiBackend:
     """
 
     name = "casadi"
+    relaxes = True
 
     def __init__(self, config: CasadiConfig | None = None, *, degree: int = 3, spacing: float = 0.2) -> None:
         self.config = config or CasadiConfig()
@@ -147,7 +151,6 @@ class CasadiBackend:
             max_iterations=c.max_iterations,
             tolerance=c.tolerance,
             tangent=float(np.tan(c.heading)),
-            presolve=c.presolve,
             timed=timed,
         )
 
@@ -209,17 +212,17 @@ class CasadiBackend:
         self, instance: _Instance, points: Array, deadline: float | None, time_limit: float | None
     ) -> SolveResult:
         """Solve around the guide, then around the solution, until the exact constraints are kept."""
+        problem, model = instance.problem, instance.model
         why = _start_violation(instance)
         if why:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
-        iterations, room = 0, None
-        for _ in range(self.config.rounds):
-            room = _room(instance, points, room)
-            separation = self._separate(instance, points, room)
-            why = separation.why or _gap(separation)
-            if why:
-                return SolveResult(SolveStatus.INFEASIBLE, iterations=iterations, detail=why)
-            points, status, word, count = self._run(instance, separation, points, deadline)
+        separation, points, why = self._open(instance, points)
+        if why:
+            return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+        iterations = 0
+        for round_ in range(self.config.rounds):
+            low, high = self._bounds(instance, separation, points if round_ else None, _TRUST * 0.5**round_)
+            points, status, word, count = self._run(instance, points, low, high, deadline)
             iterations += count
             residuals = self._residuals(instance, separation, points)
             kept = max(residuals.values()) <= TOLERANCE
@@ -228,6 +231,9 @@ class CasadiBackend:
             if deadline is not None and time.perf_counter() > deadline:
                 status = SolveStatus.TIME_LIMIT
                 break
+            shape = (model.obstacle @ points)[instance.windows.row] + instance.origin
+            room = _room(instance, shape, separation.room)
+            separation = separate(problem, instance.windows, len(model.obstacle), shape, room, separation.side)
         detail = word
         if status is SolveStatus.SOLVED and not kept:
             status, detail = SolveStatus.NUMERICAL_ERROR, f"{_worst(residuals)} after {self.config.rounds} rounds"
@@ -237,31 +243,54 @@ class CasadiBackend:
             detail = f"{word}; at the last iterate {_worst(residuals)}"
         curve = None
         if kept and status is not SolveStatus.INFEASIBLE:
-            curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, frozen(points + instance.origin))
+            curve = UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(points + instance.origin))
         objective = self._objective(instance, points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
-    def _separate(
-        self, instance: _Instance, points: Array, room: tuple[Array, Array] | None
-    ) -> Separation:
-        problem, windows, model = instance.problem, instance.windows, instance.model
-        shape = (model.obstacle @ points)[windows.row] + instance.origin
-        return separate(problem, windows, len(model.obstacle), shape, room, problem.occupancy.ids)
+    def _open(self, instance: _Instance, points: Array) -> tuple[Separation, Array, str]:
+        """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
+
+        The guide's sides come first. Where they contradict the limits, the curve that misses the
+        obstacles by the least is asked for its sides instead, and so on.
+        """
+        model, problem, windows = instance.model, instance.problem, instance.windows
+        slope = self._slope(instance)
+        moment = windows.start[:, None] + windows.fraction * (windows.end - windows.start)[:, None]
+        guide: Curve = problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
+        shape = guide.sample(moment.ravel()).position.reshape(*moment.shape, 2)
+        if not problem.lateral:
+            shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
+        room = _room(instance, shape)
+        why, before = "", None
+        for _ in range(_SIDES):
+            separation = separate(problem, windows, len(model.obstacle), shape, room)
+            if separation.why:
+                return separation, points, separation.why
+            if before is not None and np.array_equal(separation.side, before):
+                break
+            before = separation.side
+            why = why or _gap(separation)
+            low, high = self._bounds(instance, separation)
+            x, feasible = model.unknowns(points), False
+            if not _gap(separation):
+                x, feasible = model.presolve(x, slope, low, high)
+            if feasible is not False:
+                return separation, model.with_unknowns(points, x), ""
+            elastic = model.elastic(slope, low, high)
+            if elastic is None:
+                return separation, points, "no curve from the start state keeps the limits and the road"
+            points = model.with_unknowns(points, elastic[0])
+            why = why or _missed(instance, separation, points, elastic[1])
+            shape = (model.obstacle @ points)[windows.row] + instance.origin
+            room = _room(instance, shape)
+        return separation, points, why
 
     def _run(
-        self, instance: _Instance, separation: Separation, points: Array, deadline: float | None
+        self, instance: _Instance, points: Array, low: Array, high: Array, deadline: float | None
     ) -> tuple[Array, SolveStatus, str, int]:
         """One NLP: the new control points, the status, the solver's word, the iterations."""
         model = instance.model
-        low, high = self._bounds(instance, separation)
-        slope = self._slope(instance)
-        x0 = model.unknowns(points)
-        if model.structure.presolve:
-            x0, feasible = model.presolve(x0, slope, low, high)
-            if feasible is False:
-                return points, SolveStatus.INFEASIBLE, self._conflict(instance, separation, points, slope), 0
-        points = model.with_unknowns(points, x0)
-        data = self._sample_data(instance, points)
+        x0, slope, data = model.unknowns(points), self._slope(instance), self._sample_data(instance, points)
         solution = model.solve(x0, data, slope, low, high, deadline)
         status, word = _status(model, solution.word), solution.word
         if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
@@ -271,8 +300,13 @@ class CasadiBackend:
             status, word = _status(oracle, solution.word), f"{word}, then IPOPT: {solution.word}"
         return model.with_unknowns(points, solution.x), status, word, solution.iterations
 
-    def _bounds(self, instance: _Instance, separation: Separation) -> tuple[Array, Array]:
-        """Bounds of all rows of the model, taken in by the solver's own tolerance."""
+    def _bounds(
+        self, instance: _Instance, separation: Separation, around: Array | None = None, trust: float = _INF
+    ) -> tuple[Array, Array]:
+        """Bounds of all rows of the model, taken in by the solver's own tolerance.
+
+        With ``around`` s stays within ``trust`` [m] of those control points' curve.
+        """
         model = instance.model
         lower, upper = list(instance.lower), list(instance.upper)
         for k, rows in enumerate(model.linear):
@@ -280,24 +314,12 @@ class CasadiBackend:
                 shift = instance.origin[rows.axis]
                 lower[k] = separation.lower[:, rows.axis] - shift
                 upper[k] = separation.upper[:, rows.axis] - shift
+                if around is not None and rows.axis == 0:
+                    here = rows.matrix @ around[:, 0]
+                    lower[k] = np.maximum(lower[k], here - trust)
+                    upper[k] = np.minimum(upper[k], here + trust)
         low, high = model.bounds(instance.head, lower, upper)
         return low + _TIGHTEN, high - _TIGHTEN
-
-    def _conflict(self, instance: _Instance, separation: Separation, points: Array, slope: Array) -> str:
-        """Which obstacle it is that the limits leave no way around: the first that a free curve hits."""
-        model = instance.model
-        nobody = np.full_like(separation.lower, _INF)
-        free = replace(separation, lower=-nobody, upper=nobody)
-        x, feasible = model.presolve(model.unknowns(points), slope, *self._bounds(instance, free))
-        if feasible is not True:
-            return "no curve from the start state keeps the limits of speed, acceleration and jerk"
-        position = model.obstacle @ model.with_unknowns(points, x) + instance.origin
-        depth = np.stack([separation.lower - position, position - separation.upper])
-        worst = np.max(depth, axis=(0, 2))
-        row = int(np.argmin(np.where(worst > _TIGHTEN, separation.times, _INF)))
-        end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
-        who = (separation.lower_by, separation.upper_by)[int(end)][row, axis]
-        return f"no curve within the limits keeps clear of {separation.who(who)} (t = {separation.times[row]:.2f} s)"
 
     def _slope(self, instance: _Instance) -> Array:
         """Linear part of the objective (m,): pull towards the reference, and the given points."""
@@ -377,18 +399,31 @@ def _windows(problem: RepairProblem, model: Model) -> Windows:
     return Windows(edges[keep], edges[keep + 1], row, np.arange(p + 1) / p)
 
 
-def _room(instance: _Instance, points: Array, before: tuple[Array, Array] | None) -> tuple[Array, Array] | None:
-    """Room on the road over the s that the curve covers in each window; it only ever narrows."""
+def _room(instance: _Instance, shape: Array, before: tuple[Array, Array] | None = None) -> tuple[Array, Array] | None:
+    """Room on the road over the s that a curve's window points (W, C, 2) cover; it only ever narrows."""
     problem = instance.problem
-    if not problem.lateral:
+    if not problem.lateral or not len(shape):
         return None
-    s = (instance.model.obstacle @ points)[instance.windows.row, 0] + instance.origin[0]
-    slack = 0.0 if before is not None else 0.5
+    s = shape[..., 0]
+    slack = 0.0 if before is not None else _ROAD_SLACK
     own = problem.start[0, [1, 1]]
     right, left = road_room(problem.bounds, s.min(axis=1) - slack, s.max(axis=1) + slack, own)
     if before is not None:
         right, left = np.maximum(right, before[0]), np.minimum(left, before[1])
     return right, left
+
+
+def _missed(instance: _Instance, separation: Separation, points: Array, miss: float) -> str:
+    """The obstacle that is missed by the most, as a sentence."""
+    position = instance.model.obstacle @ points + instance.origin
+    depth = np.stack([separation.lower - position, position - separation.upper])
+    row = int(np.argmax(np.max(depth, axis=(0, 2)) > 0.99 * miss - 1e-6))
+    end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
+    who = (separation.lower_by, separation.upper_by)[int(end)][row, axis]
+    return (
+        f"every curve within the limits comes at least {miss:.2f} m too close to {separation.who(who)} "
+        f"(t = {separation.times[row]:.2f} s)"
+    )
 
 
 def _gap(separation: Separation) -> str:

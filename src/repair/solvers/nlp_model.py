@@ -60,8 +60,6 @@ class Structure:
     tolerance : float
     tangent : float
         Largest l' / s'.
-    presolve : bool
-        Make the QP of the linear rows as well.
     timed : bool
         The solver asks after every iteration whether there is time left.
     """
@@ -77,7 +75,6 @@ class Structure:
     max_iterations: int
     tolerance: float
     tangent: float
-    presolve: bool = True
     timed: bool = False
 
     @property
@@ -261,8 +258,50 @@ class Model:
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": ca.vertcat(*g)}
         self._function = self._make_solver(nlp)
         shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
-        self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False}) if s.presolve else None
+        self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False})
         self._qp_data = {"h": hessian, "a": matrix}
+        self._compile_elastic()
+
+    def _compile_elastic(self) -> None:
+        """The QP in which all obstacle rows give way by the same, smallest possible amount."""
+        import casadi as ca
+
+        matrix = self._free_matrix()
+        owner = np.repeat([rows.family == "obstacles" for rows in self._linear], [len(k) for k in self._kept])
+        self._soft = np.flatnonzero(owner)
+        count, m = matrix.shape
+        a = np.zeros((count + len(self._soft), m + 1))
+        a[:count, :m] = matrix
+        a[count:, :m] = matrix[self._soft]
+        a[self._soft, m], a[count:, m] = 1.0, -1.0
+        h = 1e-4 * np.eye(m + 1)
+        h[:m, :m] += 1e-4 * np.kron(np.eye(self.structure.axes), self.hessian[self.structure.degree :, self.structure.degree :])
+        self._elastic_data = {"h": ca.DM(h), "a": _sparse(a)}
+        shapes = {k: v.sparsity() for k, v in self._elastic_data.items()}
+        self._elastic_qp = ca.conic("elastic", "daqp", shapes, {"error_on_fail": False})
+
+    def elastic(self, slope: Array, low: Array, high: Array) -> tuple[Array, float] | None:
+        """Unknowns that keep all linear rows but the obstacles', and those as nearly as possible.
+
+        Returns
+        -------
+        x : (m,) array
+        miss : float
+            By how much [m] the obstacle rows are missed. None instead of both if even the other rows
+            contradict each other.
+        """
+        rows, m = self._qp_data["a"].shape
+        upper = high[:rows].copy()
+        upper[self._soft] = np.inf
+        lba = np.concatenate([low[:rows], np.full(len(self._soft), -np.inf)])
+        uba = np.concatenate([upper, high[self._soft]])
+        g = np.concatenate([1e-4 * slope, [100.0]])
+        lbx = np.concatenate([np.full(m, -np.inf), [0.0]])
+        out = self._elastic_qp(**self._elastic_data, g=g, lba=lba, uba=uba, lbx=lbx)
+        if int(self._elastic_qp.stats()["return_status"]) <= 0:
+            return None
+        x = np.asarray(out["x"]).ravel()
+        return x[:m], float(x[m])
 
     def _free_matrix(self) -> Array:
         """All linear rows that the unknowns can move, over the unknowns; the direction of travel last."""

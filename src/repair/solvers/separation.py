@@ -58,7 +58,7 @@ class Windows:
 class Separation:
     """Bounds (R, 2) of the position rows ``[s, l]`` and whom they come from.
 
-    ``why`` names a conflict known before any solver is asked; empty where there is none.
+    ``side`` (N, W) is the side taken of each obstacle in each window. ``why`` names a conflict known before any solver is asked; empty where there is none.
     """
 
     lower: Array
@@ -66,6 +66,8 @@ class Separation:
     lower_by: npt.NDArray[np.int64]
     upper_by: npt.NDArray[np.int64]
     times: Array
+    side: npt.NDArray[np.intp] | None = None
+    room: tuple[Array, Array] | None = None
     why: str = ""
 
     def who(self, number: int) -> str:
@@ -127,7 +129,7 @@ def separate(
     rows: int,
     shape: Array,
     room: tuple[Array, Array] | None,
-    ids: npt.NDArray[np.int64],
+    side: npt.NDArray[np.intp] | None = None,
 ) -> Separation:
     """Choose sides and bound the position rows.
 
@@ -141,17 +143,17 @@ def separate(
         Points of the curve to stay close to (the guide, or the last iterate): its sides are taken.
     room : pair of (W,) arrays or None
         Right and left end of the road for each window; None where l is given.
-    ids : (N,) int array
-        Names of the obstacles.
+    side : (N, W) int array, optional
+        Sides decided before; chosen from ``shape`` otherwise.
     """
     lower, upper = np.full((rows, 2), -np.inf), np.full((rows, 2), np.inf)
     lower_by, upper_by = (np.full((rows, 2), NOBODY, dtype=np.int64) for _ in range(2))
     times = np.zeros(rows)
     moment = windows.start[:, None] + windows.fraction * (windows.end - windows.start)[:, None]
     times[windows.row.ravel()] = moment.ravel()
-    result = Separation(lower, upper, lower_by, upper_by, times)
+    result = Separation(lower, upper, lower_by, upper_by, times, side, room)
     if len(problem.occupancy) and len(windows.start):
-        result.why = _obstacles(problem, windows, shape, room, ids, result)
+        _obstacles(problem, windows, shape, room, result)
     if room is not None:
         right, left = room
         _tighten(result, 1, -1.0, windows.row, np.repeat(-left[:, None], windows.row.shape[1], 1), ROAD)
@@ -164,47 +166,57 @@ def _obstacles(
     windows: Windows,
     shape: Array,
     room: tuple[Array, Array] | None,
-    ids: npt.NDArray[np.int64],
     result: Separation,
-) -> str:
+) -> None:
+    """Bound the rows by the chosen side of every obstacle, or say in ``why`` that there is no way."""
     cover, first, _ = _edges(problem, windows)
-    margin = problem.margin
-    own = shape[None][..., _AXIS] * _SIGN  # (1, W, C, 4)
-    slack = np.min(own - cover, axis=2)  # (N, W, 4); inf where nothing is asked for
+    margin, ids = problem.margin, problem.occupancy.ids
     start = problem.start[0][_AXIS] * _SIGN - first  # (N, 4)
     deep = np.where(np.isfinite(start), start, np.inf).max(axis=1) < -_TOUCH
     if deep.any():
-        return f"the ego starts inside obstacle {ids[int(np.argmax(deep))]}"
-    speed = max(float(problem.start[1, 0]), 0.0)
-    along = _ROOM_ALONG[0] + _ROOM_ALONG[1] * speed
-    scale = np.array([along, along, _ROOM_LATERAL, _ROOM_LATERAL])
-    with np.errstate(invalid="ignore"):
-        score = (slack - margin) / scale
+        result.why = f"the ego starts inside obstacle {ids[int(np.argmax(deep))]}"
+        return
+    slack = np.min(shape[None][..., _AXIS] * _SIGN - cover, axis=2)  # (N, W, 4); inf where nothing is asked
     if problem.lateral:
         assert room is not None
-        right, left = room
         # Out of the road's reach: the road's own bounds keep the curve off.
-        low_edge, high_edge = -cover[..., 3].max(axis=2), cover[..., 2].max(axis=2)
-        beside = (low_edge - margin >= left) | (high_edge + margin <= right)
+        right, left = room
+        beside = (-cover[..., 3].max(axis=2) - margin >= left) | (cover[..., 2].max(axis=2) + margin <= right)
     else:
         beside = (slack[..., 2:] >= margin - 1e-9).any(axis=2)
-        score[..., 2:] = -np.inf
-    blocked = np.isfinite(start) & (start < -_TOUCH)
-    score[:, 0][blocked] = -np.inf
-    side = np.argmax(score, axis=2)  # (N, W)
+    if result.side is None:
+        result.side = _choose(problem, slack - margin, start)
+    side = result.side
     needed = np.isfinite(cover).any(axis=(2, 3)) & ~beside
     n, w = np.nonzero(needed)
     chosen = side[n, w]
     # Who starts nearer than the margin keeps the distance it has.
-    near = np.where(np.isfinite(start), np.clip(start, 0.0, margin), margin)
-    taken_first = np.zeros_like(near, dtype=bool)
-    taken_first[np.arange(len(near)), side[:, 0]] = needed[:, 0]
-    keep = np.where(taken_first, near, margin)
+    from_start = np.zeros(start.shape, dtype=bool)
+    from_start[np.arange(len(start)), side[:, 0]] = needed[:, 0] & np.isfinite(start[:, 0])
+    keep = np.where(from_start, np.clip(start, 0.0, margin), margin)
     bound = cover[n, w, :, chosen] + keep[n, chosen][:, None]
     for k in range(4):
         mine = chosen == k
         _tighten(result, int(_AXIS[k]), float(_SIGN[k]), windows.row[w[mine]], bound[mine], ids[n[mine]])
-    return ""
+
+
+def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[np.intp]:
+    """Side (N, W) of each obstacle: where the shape has the most room, a metre across counting for more.
+
+    Parameters
+    ----------
+    slack : (N, W, 4) array
+        What the shape has to spare on each side [m]; negative where it is on another side.
+    start : (N, 4) array
+        The same at the first instant; the given state rules sides out.
+    """
+    along = _ROOM_ALONG[0] + _ROOM_ALONG[1] * max(float(problem.start[1, 0]), 0.0)
+    scale = np.array([along, along, _ROOM_LATERAL, _ROOM_LATERAL])
+    score = np.where(slack > 0.0, slack / scale, slack)
+    score[:, 0][np.isfinite(start) & (start < -_TOUCH)] = -np.inf
+    if not problem.lateral:
+        score[..., 2:] = -np.inf
+    return np.argmax(score, axis=2)
 
 
 def _tighten(

@@ -1,0 +1,221 @@
+"""The paper's Table II, regenerated: the time of a search, split by phase, with the machine named."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.errors import ConfigError, RepairError
+from repair.report.grid import DASH, Section, Table, against
+from repair.report.paper_cases import origin_of, origin_text, paper_scenes
+from repair.types import SearchResult
+
+if TYPE_CHECKING:
+    from repair.api import Prepared
+    from repair.scene.commonroad import Scene
+
+__all__ = ["machine", "table2"]
+
+# Table II of the paper: mean and standard deviation of the search, and of one iteration of it [s].
+_PAPER_TIMES = {1: ((1.714, 0.004), (0.426, 0.001)), 2: ((0.506, 0.003), (0.169, 0.001))}
+
+
+def machine() -> dict[str, Any]:
+    """The machine and the versions that a time was measured with."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    model = platform.processor()
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+        model = next(
+            (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), model
+        )
+    except OSError:
+        pass
+    versions = {}
+    for name in (
+        "numpy",
+        "scipy",
+        "casadi",
+        "qpsolvers",
+        "osqp",
+        "commonroad-io",
+        "commonroad-drivability-checker",
+    ):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = None
+    return {
+        "platform": platform.platform(), "cpu": model or "unknown", "logical_cpus": os.cpu_count(),
+        "python": platform.python_version(), "blas_threads": os.environ.get("OMP_NUM_THREADS"), "versions": versions,
+    }  # fmt: skip
+
+
+def table2(
+    scenario_dir: Path | str | None = None,
+    *,
+    runs: int = 100,
+    backends: Sequence[str] = ("ego", "casadi", "qptr"),
+    scenarios: Sequence[int] = (1, 2),
+    literal: Callable[[Prepared], float] | None = None,
+    literal_runs: int = 3,
+    overrides: Sequence[str] = (),
+) -> Table:
+    """Table II: time of a whole search and of one iteration of it.
+
+    Parameters
+    ----------
+    scenario_dir : path, optional
+        See :func:`table1`.
+    runs : int
+        Searches that are timed, after one that is not.
+    backends : sequence of str
+    scenarios : sequence of int
+    literal : callable, optional
+        Runs one search by the literal transcription of the paper's formulas and returns its wall
+        time [s]; the ratio to it is "not measured" otherwise.
+    literal_runs : int
+        How often that is done.
+    overrides : sequence of ``"key=value"``
+        Laid over the presets.
+
+    Raises
+    ------
+    ConfigError
+        If ``runs`` is not positive.
+    """
+    if runs < 1 or literal_runs < 1:
+        raise ConfigError(f"table II needs at least one run, not {min(runs, literal_runs)}")
+    from tqdm import tqdm
+
+    sections, data = [], []
+    with paper_scenes(scenario_dir, scenarios) as scenes:
+        bar = tqdm(total=len(scenarios) * len(backends) * runs, desc="table II", disable=None, leave=False)
+        for number, scene in scenes.items():
+            rows, slow = [], None
+            for name in backends:
+                row, prepared = _timed(name, number, scene, runs, overrides, bar.update)
+                if name == "ego" and literal is not None and prepared is not None:
+                    slow = [literal(prepared) for _ in range(literal_runs)]
+                    row["literal_s"] = _spread(slow)
+                    row["literal_ratio"] = round(float(np.mean(slow)) / row["search_s"]["mean"], 3)
+                rows.append(row)
+            origin = origin_of(scene)
+            data.append(
+                {"scenario": number, "provenance": origin, "paper": _paper_times(number), "rows": rows}
+            )
+            sections.append(_section2(number, origin, rows))
+        bar.close()
+    host = machine()
+    notes = (
+        f"Mean ± standard deviation over {runs} searches, the first one left out; milliseconds.",
+        f"Measured on {host['cpu']} ({host['logical_cpus']} logical CPUs), {host['platform']}, Python {host['python']}, "
+        + ", ".join(f"{k} {v}" for k, v in host["versions"].items() if v)
+        + ".",
+        "Absolute times do not compare across machines: the paper's were measured on an Intel Core i7-12700H. "
+        "The ratio to the literal transcription of the paper's formulas is measured here, in the same run.",
+        "Build: setting up the solver's problem; solve: the solver; check: collision, road, limits, kinematics; "
+        "rest: obstacles within reach, sides of passing, the search itself.",
+    )
+    return Table("Table II: computation time, paper and ours", tuple(sections), notes,
+                 {"runs": runs, "machine": host, "scenarios": data})  # fmt: skip
+
+
+def _spread(values: Sequence[float]) -> dict[str, float]:
+    array = np.asarray(values, dtype=np.float64)
+    return {"mean": float(array.mean()), "std": float(array.std(ddof=1)) if len(array) > 1 else 0.0}
+
+
+def _paper_times(number: int) -> dict[str, dict[str, float]]:
+    total, each = _PAPER_TIMES[number]
+    return {"search_s": {"mean": total[0], "std": total[1]}, "iteration_s": {"mean": each[0], "std": each[1]}}
+
+
+def _timed(
+    name: str, number: int, scene: Scene, runs: int, overrides: Sequence[str], step: Callable[[], Any]
+) -> tuple[dict[str, Any], Prepared | None]:
+    """Time ``runs`` searches of one backend."""
+    from repair.api import prepare
+    from repair.search import search_f_ttr
+    from repair.solvers.registry import make_backend
+
+    config = _config(Method(name, name, "f_ttr", name), number, overrides)
+    row: dict[str, Any] = {"backend": name, "literal_s": None, "literal_ratio": None}
+    try:
+        backend = make_backend(name, config)
+        prepared = prepare(scene, config)
+    except RepairError as error:
+        return {**row, "status": f"not available: {error}"}, None
+
+    def search() -> SearchResult:
+        return search_f_ttr(prepared.source, prepared.conflict, backend, prepared.checker, config.search)
+
+    found = search()  # not timed: matrices are made and libraries loaded
+    walls, parts = [], []
+    for _ in range(runs):
+        begin = time.perf_counter()
+        found = search()
+        walls.append(time.perf_counter() - begin)
+        parts.append([
+            sum(p.solve.build_time for p in found.probes),
+            sum(p.solve.solve_time for p in found.probes),
+            sum(p.check_time for p in found.probes),
+        ])  # fmt: skip
+        step()
+    iterations = max(len(found.probes), 1)
+    columns = np.column_stack([parts, np.array(walls) - np.sum(parts, axis=1)])
+    row |= {
+        "status": found.status.value,
+        "f_ttr_s": against(None, found.f_ttr)["ours"],
+        "iterations": len(found.probes),
+    }
+    row |= {"search_s": _spread(walls), "iteration_s": _spread(np.array(walls) / iterations)}
+    for key, column in zip(("build_s", "solve_s", "check_s", "rest_s"), columns.T, strict=True):
+        row[key] = _spread(column)
+    return row, prepared
+
+
+def _section2(number: int, origin: dict[str, Any], rows: Sequence[dict[str, Any]]) -> Section:
+    def span(values: dict[str, float]) -> str:
+        return f"{1e3 * values['mean']:.2f} ± {1e3 * values['std']:.2f}"
+
+    paper = _paper_times(number)
+    columns = (
+        "",
+        "search",
+        "per iteration",
+        "iterations",
+        "build",
+        "solve",
+        "check",
+        "rest",
+        "literal / ours",
+    )
+    lines = [("paper", span(paper["search_s"]), span(paper["iteration_s"]), *([DASH] * 6))]
+    for row in rows:
+        if "search_s" not in row:
+            lines.append((row["backend"], *([DASH] * 7), row["status"]))
+            continue
+        ratio = "not measured" if row["backend"] == "ego" else DASH
+        if row["literal_ratio"] is not None:
+            ratio = f"{row['literal_ratio']:.0f}"
+        times = [span(row[key]) for key in ("build_s", "solve_s", "check_s", "rest_s")]
+        lines.append(
+            (
+                row["backend"],
+                span(row["search_s"]),
+                span(row["iteration_s"]),
+                str(row["iterations"]),
+                *times,
+                ratio,
+            )
+        )
+    return Section(f"Scenario {number} ({origin_text(origin)}), times in ms", columns, tuple(lines), 1)
