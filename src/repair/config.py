@@ -120,7 +120,7 @@ class EgoConfig:
     w_j: float = 1.0
     elastic: float = 0.95  # the paper's lambda
     joint: float = 1.5  # c_j as a multiple of c_m
-    reverse: float = 20000.0  # weight of speeds below zero
+    reverse: float = 200.0  # weight of speeds below zero (not scaled by lambda_d: it is no limit of the paper)
     max_iterations: int = 100
     tolerance: float = 0.01
     rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
@@ -138,6 +138,7 @@ class CasadiConfig:
     w_jerk: float = 0.1
     w_reference: float = 0.05
     heading: float = 0.7  # largest angle between the driven path and the axis [rad]
+    overhang: float = 2.15  # half length of the body whose ends must stay on the road [m]
     rounds: int = 8  # solves around the own solution until the exact constraints are kept
     max_iterations: int = 200
     tolerance: float = 1e-8
@@ -249,6 +250,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "ego.tolerance": (1e-12, 1e3),
     "ego.rebounds": (0, 20),
     "casadi.heading": (0.01, 1.4),
+    "casadi.overhang": (0.0, 20.0),
     "casadi.rounds": (1, 100),
     "casadi.max_iterations": (1, 100_000),
     "casadi.tolerance": (1e-12, 1.0),

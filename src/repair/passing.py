@@ -183,7 +183,8 @@ def open_passings(
     -------
     tuple of Passing
         Where no manoeuvre that keeps the path is open, the one of them that comes closest is
-        added: the boxes are wider than the vehicles, so it is for the checker to say that it fails.
+        added, and where none is open at all, so are the closest on the left and on the right: the
+        boxes are wider than the vehicles, so it is for the checker to say that they fail.
     """
     tau = reference.t - reference.t[0]
     lower, upper = occupancy.at(reference.t)
@@ -197,28 +198,33 @@ def open_passings(
     excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat).max(axis=1)
     excess = np.maximum(excess, 0.0)
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
-    closest: tuple[float, int, _LateralProfile, Maneuver] | None = None
+    closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
     for profile in profiles:
         overlap = (lower[..., 1] - margin < profile.l) & (profile.l < upper[..., 1] + margin)
-        behind = lower[None, :, :, 0] - margin - speeds.s[:, None, :]
-        ahead = speeds.s[:, None, :] - upper[None, :, :, 0] - margin
-        depth = np.where(overlap, np.minimum(-behind, -ahead), 0.0).max(axis=(1, 2), initial=0.0)
+        met = np.flatnonzero(overlap.any(axis=1))
+        behind = lower[met, :, 0] - margin - speeds.s[:, None, :]
+        ahead = speeds.s[:, None, :] - upper[met, :, 0] - margin
+        depth = np.where(overlap[met], np.minimum(-behind, -ahead), 0.0).max(axis=(1, 2), initial=0.0)
         free = (depth <= 0.0) & (excess <= 0.0)
         cost = speeds.cost + profile.cost
-        for maneuver, members in _kinds(profile, conflict, overlap, ahead > 0.0, speeds).items():
+        for maneuver, members in _kinds(profile, conflict, overlap, met, ahead, speeds).items():
             usable = np.flatnonzero(free & members)
             if len(usable):
                 p = int(usable[np.argmin(cost[usable])])
                 if maneuver not in best or cost[p] < best[maneuver][0]:
                     best[maneuver] = (float(cost[p]), p, profile)
-            elif profile.maneuver is None and members.any():
+            elif members.any():
                 badness = np.where(members, 10.0 * depth + excess, np.inf)
                 p = int(np.argmin(badness))
-                if closest is None or badness[p] < closest[0]:
-                    closest = (float(badness[p]), p, profile, maneuver)
-    if closest is not None and not best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD}:
-        badness_, p, profile, maneuver = closest
-        best[maneuver] = (1e3 + badness_, p, profile)
+                if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
+                    closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
+    wanted = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
+    if not best:
+        wanted += [Maneuver.LEFT, Maneuver.RIGHT]
+    for kind in wanted:
+        if kind in closest:
+            badness_, p, profile, maneuver = closest[kind]
+            best[maneuver] = (1e3 + badness_, p, profile)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
         for maneuver, (cost, p, profile) in best.items()
@@ -227,16 +233,21 @@ def open_passings(
 
 
 def _kinds(
-    profile: _LateralProfile, conflict: tuple[int, int] | None, overlap: Array, ahead: Array, speeds: _Rollouts
+    profile: _LateralProfile,
+    conflict: tuple[int, int] | None,
+    overlap: Array,
+    met: Array,
+    ahead: Array,
+    speeds: _Rollouts,
 ) -> dict[Maneuver, Array]:
     """Which speed profiles (P,) count as which manoeuvre."""
-    everyone = np.ones(len(speeds.s), dtype=bool)
-    if profile.maneuver is not None:
-        return {profile.maneuver: everyone}
-    if conflict is None:
-        return {Maneuver.YIELD: everyone}
+    if profile.maneuver is not None or conflict is None:
+        return {profile.maneuver or Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
     j = conflict[1]
-    passed = (ahead[:, j] & overlap[j]).any(axis=1)
+    where = np.flatnonzero(met == j)
+    if not len(where):
+        return {Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
+    passed = ((ahead[:, where[0]] > 0.0) & overlap[j]).any(axis=1)
     return {Maneuver.YIELD: ~passed, Maneuver.GO_AHEAD: passed}
 
 

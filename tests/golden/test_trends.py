@@ -60,7 +60,7 @@ def with_speed(scene: Scene, speed: float) -> Scene:
             marks=pytest.mark.xfail(
                 strict=True,
                 reason="the soft penalty gives up part of the margin, and the checker judges true rectangles: "
-                "with S_offset 2.25 m (half the vehicle + 0.1 m) t_rep = 2.0 s touches, with 3 m not",
+                "with S_offset 2.25 m (half the vehicle + 0.1 m) 2.0 s touches, with 3 m not",
             ),
         ),
     ],

@@ -466,3 +466,10 @@ def test_a_reader_that_leaves_is_no_error() -> None:
         heard = stderr.read()
     assert running.wait(timeout=60) == 0
     assert heard == b""
+
+
+def test_the_documented_table_is_up_to_date() -> None:
+    from repair.report.text import key_table
+
+    usage = Path(__file__).parents[2] / "docs" / "usage.md"
+    assert usage.read_text("utf-8").endswith(f"{key_table()}\n"), "renew it with `repair config --table`"

@@ -286,7 +286,6 @@ def test_costs_are_the_literal_ones_where_the_reference_swerves(monkeypatch):
     check_costs(problem, PLAIN, 0.4, run(monkeypatch, problem))
 
 
-@pytest.mark.xfail(reason="J leaves out the constant share of l where l stands", strict=False)
 def test_costs_include_what_stands_sideways(monkeypatch):
     problem = make_problem(Side.BEHIND, lateral=False, reference=swerving_reference())
     check_costs(problem, PLAIN, 0.4, run(monkeypatch, problem))

@@ -278,7 +278,7 @@ def test_a_full_disk_leaves_nothing_behind(
         if len(calls) == 2:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(export, "_write", full)
+    monkeypatch.setattr("repair.files._write", full)
     with pytest.raises(OutputError, match="No space left on device"):
         save(found, tmp_path / "a" / "b", figure=False)
     assert list(tmp_path.iterdir()) == []

@@ -49,7 +49,7 @@ class BernsteinCurve:
     @property
     def degree(self) -> int:
         """Degree n of the pieces."""
-        return self.points.shape[1] - 1
+        return int(self.points.shape[1]) - 1
 
     @property
     def t_end(self) -> float:
@@ -133,7 +133,7 @@ class QpStructure:
 def _derivative(pieces: int, degree: int, duration: float, order: int) -> Array:
     """Block-diagonal map from control points to those of the ``order``-th derivative."""
     scale = factorial(degree) / factorial(degree - order) / duration**order
-    return np.kron(np.eye(pieces), scale * np.diff(np.eye(degree + 1), n=order, axis=0))
+    return np.asarray(np.kron(np.eye(pieces), scale * np.diff(np.eye(degree + 1), n=order, axis=0)))
 
 
 def _joints(pieces: int, degree: int, continuity: int) -> Array:

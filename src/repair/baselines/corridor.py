@@ -105,12 +105,11 @@ def _guide(problem: RepairProblem, times: Array) -> Array:
 def _walls(
     problem: RepairProblem, times: Array, edges: Array, guide: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """What the obstacles leave to each piece at each time, (M, K) each: largest and smallest s, smallest and
-    largest l.
+    """What the obstacles leave to each piece: largest and smallest s, smallest and largest l, (M, K) each.
 
     Over a piece an obstacle is kept on that side which the guide keeps all the time; where the guide
     changes sides within the piece, each time has its own.
-    """  # noqa: D205
+    """
     pieces, count = len(edges) - 1, len(times)
     duration = problem.t_end - problem.t_rep
     farthest = problem.start[0, 0] + problem.limits.v_max * duration + 1.0
@@ -121,14 +120,9 @@ def _walls(
         return above, below, left, right
     lower, upper = problem.occupancy.at(times)
     lower, upper = lower - problem.margin, upper + problem.margin
-    room = np.stack(
-        [
-            lower[..., 0] - guide[:, 0],
-            guide[:, 0] - upper[..., 0],
-            guide[:, 1] - upper[..., 1],
-            lower[..., 1] - guide[:, 1],
-        ]
-    )  # in the order of Side
+    s, l = guide.T  # noqa: E741
+    # in the order of Side
+    room = np.stack([lower[..., 0] - s, s - upper[..., 0], l - upper[..., 1], lower[..., 1] - l])
     present = np.isfinite(room).all(axis=0)
     if not problem.lateral:
         # l is given: a box beside it is no matter, and one across it can only be passed along s.
@@ -171,7 +165,7 @@ def _line_below(t: Array, values: Array, guide: Array) -> Array:
     below = (lines <= values + _TOLERANCE).all(axis=1)
     lines = lines[below]
     best = int(np.argmax((lines - guide).min(axis=1)))
-    return lines[best][[0, -1]]
+    return np.asarray(lines[best][[0, -1]])
 
 
 def _cut_to_road(
@@ -191,49 +185,38 @@ def _cut_to_road(
 
 def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
     """Raise where the corridor is empty, breaks at a joint, or excludes the start or even full braking."""
-    edges = corridor.edges
-    start = problem.start[0]
-    tau = edges - edges[0]
-    speed, braking = max(float(problem.start[1, 0]), 0.0), -problem.limits.a_min
-    stop = np.minimum(tau, speed / braking)
-    nearest = start[0] + speed * stop - 0.5 * braking * stop**2
-    # Two neighbours share their joint's control point, so both must have room for it.
-    s_low = np.concatenate(
-        [
-            corridor.s_lower[:1, 0],
-            np.maximum(corridor.s_lower[:-1, 1], corridor.s_lower[1:, 0]),
-            corridor.s_lower[-1:, 1],
-        ]
-    )
-    s_high = np.concatenate(
-        [
-            corridor.s_upper[:1, 0],
-            np.minimum(corridor.s_upper[:-1, 1], corridor.s_upper[1:, 0]),
-            corridor.s_upper[-1:, 1],
-        ]
-    )
+    edges, start = corridor.edges, problem.start[0]
     if (corridor.l_lower > corridor.l_upper + _TOLERANCE).any():
         i = int(np.argmax(corridor.l_lower - corridor.l_upper))
         raise NoCorridor(f"no room sideways between t = {edges[i]:.2f} s and {edges[i + 1]:.2f} s")
-    low, high = (
-        np.maximum(corridor.l_lower[:-1], corridor.l_lower[1:]),
-        np.minimum(corridor.l_upper[:-1], corridor.l_upper[1:]),
-    )
-    if (low > high + _TOLERANCE).any():
-        i = int(np.argmax(low - high))
-        raise NoCorridor(f"the pieces that meet at t = {edges[i + 1]:.2f} s have no l in common")
-    if (s_low > s_high + _TOLERANCE).any():
-        i = int(np.argmax(s_low - s_high))
-        raise NoCorridor(f"no room along the path at t = {edges[i]:.2f} s")
+    # Two neighbours share their joint's control point, so both must have room for it.
+    l_low = _at_edges(corridor.l_lower, corridor.l_lower, np.maximum)
+    l_high = _at_edges(corridor.l_upper, corridor.l_upper, np.minimum)
+    s_low = _at_edges(corridor.s_lower[:, 0], corridor.s_lower[:, 1], np.maximum)
+    s_high = _at_edges(corridor.s_upper[:, 0], corridor.s_upper[:, 1], np.minimum)
     if not s_low[0] - _TOLERANCE <= start[0] <= s_high[0] + _TOLERANCE:
-        raise NoCorridor(f"the start is {start[0] - s_high[0]:.2f} m beyond the first trapezoid")
-    if (
-        problem.lateral
-        and not corridor.l_lower[0] - _TOLERANCE <= start[1] <= corridor.l_upper[0] + _TOLERANCE
-    ):
+        raise NoCorridor(f"the start lies {start[0] - s_high[0]:.2f} m beyond the first trapezoid")
+    if problem.lateral and not l_low[0] - _TOLERANCE <= start[1] <= l_high[0] + _TOLERANCE:
         raise NoCorridor("the start lies beside the first piece of the corridor")
-    if (nearest > s_high + 1e-3).any():
-        i = int(np.argmax(nearest > s_high + 1e-3))
+    for low, high, where in ((s_low, s_high, "along the path"), (l_low, l_high, "sideways")):
+        if (low > high + _TOLERANCE).any():
+            i = int(np.argmax(low - high))
+            raise NoCorridor(f"no room {where} at t = {edges[i]:.2f} s")
+    excess = _least_progress(problem, edges) - s_high
+    if (excess > 1e-3).any():
+        i = int(np.argmax(excess > 1e-3))
         raise NoCorridor(
-            f"at t = {edges[i]:.2f} s even full braking is {nearest[i] - s_high[i]:.2f} m beyond the corridor"
+            f"at t = {edges[i]:.2f} s even full braking leaves the corridor, by {excess[i]:.2f} m"
         )
+
+
+def _at_edges(first: Array, last: Array, tighter: np.ufunc) -> Array:
+    """Bounds at the M + 1 edges from those at the start and the end of every piece."""
+    return np.concatenate([first[:1], tighter(last[:-1], first[1:]), last[-1:]])
+
+
+def _least_progress(problem: RepairProblem, edges: Array) -> Array:
+    """Where full braking within the limits leads (M + 1,) [m]; no curve can stay farther back."""
+    s, speed, braking = problem.start[0, 0], max(float(problem.start[1, 0]), 0.0), -problem.limits.a_min
+    tau = np.minimum(edges - edges[0], speed / braking)
+    return np.asarray(s + speed * tau - 0.5 * braking * tau**2)

@@ -220,11 +220,12 @@ def maneuvers_at(
     settings: EvasiveConfig,
     vehicle: Vehicle,
 ) -> Sequence[EvasiveCurve]:
-    """The variants of a manoeuvre from ``t_start`` on: one along the path, one for each offset of steering."""
+    """The variants of a manoeuvre from ``t_start`` on: one along the path, or one for each offset."""
     path_s, path_l = _path_of(reference, t_end)
     state = reference.sample([t_start])
     s, v = float(state.position[0, 0]), max(float(state.velocity[0, 0]), 0.0)
     duration = t_end - t_start
+    along: list[tuple[float, ...]]
     if maneuver is EvasiveManeuver.BRAKE:
         along = [(0.0, s, v, -settings.a_brake)]
         stop = v / settings.a_brake
@@ -233,8 +234,7 @@ def maneuvers_at(
         along = _kick_down(s, v, duration, settings.a_kick, vehicle)
     else:
         along = [(0.0, s, v, 0.0)]
-    straight = [(0.0, 0.0, 0.0, 0.0, 0.0)]
-    profiles = [straight]
+    profiles: list[list[tuple[float, ...]]] = [[(0.0, 0.0, 0.0, 0.0, 0.0)]]
     if maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT):
         sign = 1.0 if maneuver is EvasiveManeuver.STEER_LEFT else -1.0
         count = max(1, int(np.floor(settings.offset_max / settings.offset_step + 1e-9)))
@@ -259,7 +259,8 @@ def _kick_down(
     s: float, v: float, duration: float, a_kick: float, vehicle: Vehicle
 ) -> list[tuple[float, ...]]:
     """Full throttle: ``a_kick`` as far as the engine goes (power limit above v_switch, top speed)."""
-    phases, t = [], 0.0
+    phases: list[tuple[float, ...]] = []
+    t = 0.0
     while t < duration - 1e-9:
         a = min(a_kick, vehicle.a_max * min(1.0, vehicle.v_switch / max(v, 1e-9)))
         a = max(0.0, min(a, (vehicle.v_max - v) / _ENGINE_STEP))
@@ -281,10 +282,10 @@ def _steering(v: float, settings: EvasiveConfig, vehicle: Vehicle) -> tuple[floa
 
 
 def _swerve(offset: float, acceleration: float, jerk: float) -> list[tuple[float, ...]]:
-    """To ``offset`` and straight again: two opposite pulses of lateral acceleration, ramps limited by the jerk.
+    """To ``offset`` and straight again: two opposite pulses of lateral acceleration with limited jerk.
 
     A pulse with ramps r and plateau h moves ``a (h + r) (h + 2 r)`` in all; where the ramps alone move
-    farther than that, the peak is lowered.
+    farther than that, the peak is lowered. A point mass has r = 0.
     """
     distance, sign = abs(offset), float(np.sign(offset))
     ramp = acceleration / jerk
@@ -293,17 +294,19 @@ def _swerve(offset: float, acceleration: float, jerk: float) -> list[tuple[float
         ramp, plateau = acceleration / jerk, 0.0
     else:
         plateau = 0.5 * (-3.0 * ramp + float(np.sqrt(ramp**2 + 4.0 * distance / acceleration)))
-    rise = 0.0 if ramp == 0.0 else acceleration / ramp
-    pulses = [(ramp, rise), (plateau, 0.0), (ramp, -rise), (ramp, -rise), (plateau, 0.0), (ramp, rise)]
-    steps = [acceleration, 0.0, -acceleration, -acceleration, 0.0, acceleration] if ramp == 0.0 else [0.0] * 6
-    phases, t, position, rate, bend = [], 0.0, 0.0, 0.0, 0.0
-    for (duration, slope), jump in zip(pulses, steps, strict=True):
-        bend += sign * jump  # a point mass changes its acceleration at once
-        if duration > 0.0:
-            phases.append((t, position, rate, bend, sign * slope))
-        position += rate * duration + 0.5 * bend * duration**2 + sign * slope * duration**3 / 6.0
-        rate += bend * duration + 0.5 * sign * slope * duration**2
-        bend += sign * slope * duration
-        t += duration
+    slope = jerk if ramp > 0.0 else 0.0
+    # duration, acceleration at the start, jerk: there and back
+    pulse = [(ramp, 0.0, slope), (plateau, acceleration, 0.0), (ramp, acceleration, -slope)]
+    phases: list[tuple[float, ...]] = []
+    t = position = rate = 0.0
+    for direction in (sign, -sign):
+        for duration, start, change in pulse:
+            bend, change = direction * start, direction * change
+            phases.append((t, position, rate, bend, change))
+            position += rate * duration + 0.5 * bend * duration**2 + change * duration**3 / 6.0
+            rate += bend * duration + 0.5 * change * duration**2
+            t += duration
     phases.append((t, offset, 0.0, 0.0, 0.0))
-    return phases
+    return [
+        phase for phase, after in zip(phases, [*phases[1:], (np.inf,)], strict=True) if after[0] > phase[0]
+    ]

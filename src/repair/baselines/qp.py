@@ -124,7 +124,7 @@ def _word(solution: Any) -> str:
 
 
 def infeasibility(rows: Array, limit: Array) -> float:
-    """Smallest largest violation of ``rows @ z <= limit`` over all z (rows of unit norm); 0 if there is none."""
+    """Smallest possible violation of ``rows @ z <= limit`` (rows of unit norm); 0 if z exists."""
     from scipy.optimize import linprog
 
     m = rows.shape[1]
@@ -177,10 +177,12 @@ def _objection(solver: str) -> str | None:
         answer = solve_projection(origin, rows, limit, solver)
         if optimum is None:
             if answer.status is not SolveStatus.INFEASIBLE:
-                return f"on a braking problem without solution it answers {answer.status.value!r} ({answer.detail})"
+                return (
+                    f"a braking problem without solution it calls {answer.status.value!r} ({answer.detail})"
+                )
             continue
         if answer.z is None:
-            return f"on a braking problem that has a solution it answers {answer.status.value!r} ({answer.detail})"
+            return f"a braking problem with a solution it calls {answer.status.value!r} ({answer.detail})"
         value = 0.5 * float(np.sum((answer.z - origin) ** 2))
         if abs(value - optimum) > 1e-4 * abs(optimum):
             return f"on a braking problem it stops at the value {value:.6g}, the optimum is {optimum:.6g}"

@@ -84,7 +84,7 @@ class QptrBackend:
                 f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration"
             )
         pieces = max(1, int(np.ceil(duration / self.config.spacing - 1e-9)))
-        edges = problem.t_rep + duration / pieces * np.arange(pieces + 1)
+        edges = np.asarray(problem.t_rep + duration / pieces * np.arange(pieces + 1))
         try:
             corridor = build_corridor(problem, edges)
         except NoCorridor as closed:
@@ -115,7 +115,7 @@ class QptrBackend:
         )
 
     def _structure(self, edges: Array, axis: int) -> QpStructure:
-        """Sideways the repair comes to rest, so that it ends parallel to the path; along it the end is free."""
+        """Sideways the repair comes to rest, so as to end parallel to the path; along it the end is free."""
         c, pieces = self.config, len(edges) - 1
         duration = float(edges[-1] - edges[0]) / pieces
         return qp_structure(pieces, c.degree, duration, c.continuity, c.w_jerk, c.w_deviation, axis == 1)

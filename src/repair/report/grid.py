@@ -23,13 +23,16 @@ class Section:
     columns : tuple of str
     rows : tuple of tuple of str
     rule_after : int or None
-        A line is drawn below this many rows: what follows is not in the paper.
+        A line is drawn below this many rows.
+    rule_label : str
+        What the rows below that line are.
     """
 
     heading: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     rule_after: int | None = None
+    rule_label: str = "not in the paper"
 
 
 @dataclass(frozen=True)
@@ -63,15 +66,15 @@ class Table:
             ]
             for k, row in enumerate(section.rows):
                 if k == section.rule_after:
-                    lines.append(_pipe(["*not in the paper*"] + [""] * (len(row) - 1)))
+                    lines.append(_pipe([f"*{section.rule_label}*"] + [""] * (len(row) - 1)))
                 lines.append(_pipe(row))
         lines += ["", *(f"- {note}" for note in self.notes)]
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> str:
         """Strict JSON."""
-        return json.dumps({"title": self.title, **self.data, "notes": list(self.notes)}, indent=2, ensure_ascii=False,
-                          allow_nan=False) + "\n"  # fmt: skip
+        content = {"title": self.title, **self.data, "notes": list(self.notes)}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def to_latex(self) -> str:
         """One ``table`` with a booktabs ``tabular`` for each section."""
@@ -103,9 +106,9 @@ def _pipe(cells: Sequence[str]) -> str:
 
 
 _TEX = {
-    "\\": "\\textbackslash{}", "&": "\\&", "%": "\\%", "$": "\\$", "#": "\\#", "_": "\\_", "{": "\\{", "}": "\\}",
-    "~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "²": "$^2$", "±": "$\\pm$", "−": "$-$", "–": "--",
-    "Δ": "$\\Delta$", "<": "$<$", ">": "$>$",
+    "\\": "\\textbackslash{}", "&": "\\&", "%": "\\%", "$": "\\$", "#": "\\#", "_": "\\_",
+    "{": "\\{", "}": "\\}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "²": "$^2$",
+    "±": "$\\pm$", "−": "$-$", "–": "--", "…": "\\ldots{}", "Δ": "$\\Delta$", "<": "$<$", ">": "$>$",
 }  # fmt: skip
 
 
@@ -121,6 +124,7 @@ def against(paper: float | None, ours: float | None) -> dict[str, float | None]:
 
 
 def decimal(value: float | None, digits: int, signed: bool = False) -> str:
+    """A number with a typographic minus; a dash where there is none."""
     if value is None:
         return DASH
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 __all__ = ["origin_of", "origin_text", "paper_scenes"]
 
-_OFFICIAL_FILE = "DEU_Flensburg-6_1_T-1.xml"
-
 
 def paper_scenes(scenario_dir: Path | str | None, numbers: Sequence[int]) -> dict[int, Scene]:
     """The scenes of the paper's scenarios, read as their presets say.
@@ -23,7 +21,8 @@ def paper_scenes(scenario_dir: Path | str | None, numbers: Sequence[int]) -> dic
     Parameters
     ----------
     scenario_dir : path, optional
-        Folder that may hold the official file of Scenario 1; whatever is not there is generated.
+        Folder that may hold the official file of Scenario 1; the folder COMMONROAD_SCENARIOS is asked
+        next, and what is in neither is generated.
     numbers : sequence of int
 
     Raises
@@ -32,19 +31,18 @@ def paper_scenes(scenario_dir: Path | str | None, numbers: Sequence[int]) -> dic
         If the folder does not exist.
     """
     from repair.config import load_config
+    from repair.scene.bundled import OFFICIAL_FILES, paper_scenario
     from repair.scene.commonroad import load_scene
-    from repair.scene.synthetic import write_scenario
 
-    folder = None if scenario_dir is None else Path(scenario_dir)
-    if folder is not None and not folder.is_dir():
-        raise ConfigError(f"the scenario folder {folder} does not exist")
+    if scenario_dir is not None and not Path(scenario_dir).is_dir():
+        raise ConfigError(f"the scenario folder {scenario_dir} does not exist")
     scenes = {}
-    with tempfile.TemporaryDirectory(prefix="repair-") as aside:
-        for number in numbers:
-            path = folder / _OFFICIAL_FILE if folder is not None else None
-            if number != 1 or path is None or not path.is_file():
-                path = write_scenario(f"scenario_{number}", Path(aside))
-            config = load_config(preset=f"scenario_{number}").scene
+    for number in numbers:
+        name = f"scenario_{number}"
+        config = load_config(preset=name).scene
+        given = Path(scenario_dir or ".", OFFICIAL_FILES.get(name, ""))
+        known = scenario_dir is not None and given.is_file()
+        with nullcontext(given) if known else paper_scenario(name) as path:
             scenes[number] = load_scene(
                 path,
                 planning_problem=config.planning_problem,

@@ -28,7 +28,7 @@ import numpy as np
 from repair.bspline import UniformBSpline, fit_to_curve, n_points_for, splice_points
 from repair.config import CasadiConfig, Config
 from repair.errors import BackendError
-from repair.solvers.nlp_model import Model, Structure, build_model
+from repair.solvers.nlp_model import STANDSTILL, Model, Structure, build_model
 from repair.solvers.separation import Separation, Windows, road_room, separate
 from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, SolveResult, SolveStatus, frozen
 
@@ -39,6 +39,8 @@ _TIGHTEN = 1e-7  # bounds are taken in by this much, so that the solver's own to
 _INF = np.inf
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
 _SIDES = 4  # sets of sides that are tried
+_EDGE = 0.05  # [m] kept from the edge of the road
+_OWN = 0.05  # [m] by which the body's ends may always leave the axis' own
 _ROAD_SLACK = 0.5  # [m] of s either way of the guide over which the road must be wide enough
 
 _STATUS = {
@@ -151,6 +153,7 @@ class CasadiBackend:
             max_iterations=c.max_iterations,
             tolerance=c.tolerance,
             tangent=float(np.tan(c.heading)),
+            overhang=c.overhang,
             timed=timed,
         )
 
@@ -221,7 +224,8 @@ class CasadiBackend:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
         iterations = 0
         for round_ in range(self.config.rounds):
-            low, high = self._bounds(instance, separation, points if round_ else None, _TRUST * 0.5**round_)
+            trust = _TRUST * 0.5**round_ if round_ else None
+            low, high = self._bounds(instance, separation, points, trust)
             points, status, word, count = self._run(instance, points, low, high, deadline)
             iterations += count
             residuals = self._residuals(instance, separation, points)
@@ -232,7 +236,7 @@ class CasadiBackend:
                 status = SolveStatus.TIME_LIMIT
                 break
             shape = (model.obstacle @ points)[instance.windows.row] + instance.origin
-            room = _room(instance, shape, separation.room)
+            room = _room(instance, shape, min(_ROAD_SLACK, 0.5 * trust) if trust else _ROAD_SLACK)
             separation = separate(problem, instance.windows, len(model.obstacle), shape, room, separation.side)
         detail = word
         if status is SolveStatus.SOLVED and not kept:
@@ -270,7 +274,7 @@ class CasadiBackend:
                 break
             before = separation.side
             why = why or _gap(separation)
-            low, high = self._bounds(instance, separation)
+            low, high = self._bounds(instance, separation, points)
             x, feasible = model.unknowns(points), False
             if not _gap(separation):
                 x, feasible = model.presolve(x, slope, low, high)
@@ -301,11 +305,11 @@ class CasadiBackend:
         return model.with_unknowns(points, solution.x), status, word, solution.iterations
 
     def _bounds(
-        self, instance: _Instance, separation: Separation, around: Array | None = None, trust: float = _INF
+        self, instance: _Instance, separation: Separation, around: Array, trust: float | None = None
     ) -> tuple[Array, Array]:
         """Bounds of all rows of the model, taken in by the solver's own tolerance.
 
-        With ``around`` s stays within ``trust`` [m] of those control points' curve.
+        ``around`` are control points nearby; with ``trust`` [m] s stays that close to their curve.
         """
         model = instance.model
         lower, upper = list(instance.lower), list(instance.upper)
@@ -314,10 +318,14 @@ class CasadiBackend:
                 shift = instance.origin[rows.axis]
                 lower[k] = separation.lower[:, rows.axis] - shift
                 upper[k] = separation.upper[:, rows.axis] - shift
-                if around is not None and rows.axis == 0:
+                if trust is not None and rows.axis == 0:
                     here = rows.matrix @ around[:, 0]
                     lower[k] = np.maximum(lower[k], here - trust)
                     upper[k] = np.minimum(upper[k], here + trust)
+        if instance.problem.lateral:
+            ends = _room_of_ends(instance, around, min(_ROAD_SLACK, trust or _INF), _EDGE)
+            lower += [ends[0], ends[2]]
+            upper += [ends[1], ends[3]]
         low, high = model.bounds(instance.head, lower, upper)
         return low + _TIGHTEN, high - _TIGHTEN
 
@@ -399,18 +407,33 @@ def _windows(problem: RepairProblem, model: Model) -> Windows:
     return Windows(edges[keep], edges[keep + 1], row, np.arange(p + 1) / p)
 
 
-def _room(instance: _Instance, shape: Array, before: tuple[Array, Array] | None = None) -> tuple[Array, Array] | None:
-    """Room on the road over the s that a curve's window points (W, C, 2) cover; it only ever narrows."""
+def _room(instance: _Instance, shape: Array, slack: float = _ROAD_SLACK) -> tuple[Array, Array] | None:
+    """Room on the road over the s that a curve's window points (W, C, 2) cover, and ``slack`` around."""
     problem = instance.problem
     if not problem.lateral or not len(shape):
         return None
-    s = shape[..., 0]
-    slack = 0.0 if before is not None else _ROAD_SLACK
-    own = problem.start[0, [1, 1]]
-    right, left = road_room(problem.bounds, s.min(axis=1) - slack, s.max(axis=1) + slack, own)
-    if before is not None:
-        right, left = np.maximum(right, before[0]), np.minimum(left, before[1])
-    return right, left
+    s, own = shape[..., 0], problem.start[0, 1]
+    return road_room(problem.bounds, s.min(axis=1) - slack, s.max(axis=1) + slack, own, own, _EDGE)
+
+
+def _room_of_ends(
+    instance: _Instance, points: Array, slack: float, edge: float
+) -> tuple[Array, Array, Array, Array]:
+    """Right and left end of the road at the body's front, then at its back, for all samples.
+
+    The road is wide enough for the ends of a body that follows the axis, whatever the bounds say.
+    """
+    problem, model = instance.problem, instance.model
+    reach = model.structure.overhang
+    s = model.samples[0] @ points[:, 0] + instance.origin[0]
+    swing = -0.5 * reach**2 * problem.curvature_at(s[:, None] + np.linspace(-slack, slack, 5))
+    own = float(problem.start[0, 1]) + np.stack([swing.min(axis=1) - _OWN, swing.max(axis=1) + _OWN])
+    over = problem.t_rep + model.tau > problem.t_end + 1e-9
+    found = []
+    for shift in (reach, -reach):
+        right, left = road_room(problem.bounds, s + shift - slack, s + shift + slack, own[0], own[1], edge)
+        found += [np.where(over, -_INF, right), np.where(over, _INF, left)]
+    return found[0], found[1], found[2], found[3]
 
 
 def _missed(instance: _Instance, separation: Separation, points: Array, miss: float) -> str:
@@ -488,8 +511,15 @@ def _plane_violations(instance: _Instance, points: Array) -> dict[str, float]:
         )
         v, w = states[:, 1].T
         forward = (1.0 - problem.curvature_at(states[:, 0, 0]) * states[:, 0, 1]) * v
-        bend = (forward * across - w * along) / (forward**2 + w**2 + 0.01) ** 1.5
+        square = forward**2 + w**2 + STANDSTILL
+        bend = (forward * across - w * along) / square**1.5
         found["curvature"] = max(0.0, float(np.max(np.abs(bend))) - limits.curvature)
+        reach = model.structure.overhang
+        middle = states[:, 0, 1] - 0.5 * reach**2 * problem.curvature_at(states[:, 0, 0])
+        swing = reach * w / np.sqrt(square)
+        ends = _room_of_ends(instance, points, 0.0, 0.0)
+        outside = (ends[0] - middle - swing, middle + swing - ends[1], ends[2] - middle + swing, middle - swing - ends[3])
+        found["body_on_road"] = max(0.0, *(float(np.max(x)) for x in outside))
     return found
 
 
@@ -499,8 +529,8 @@ def _road_violation(instance: _Instance, points: Array) -> float:
     if not len(row):
         return 0.0
     placed = (instance.model.position @ points)[row] + instance.origin
-    own = problem.start[0, [1, 1]]
-    right, left = road_room(problem.bounds, placed[..., 0].min(axis=1), placed[..., 0].max(axis=1), own)
+    own = problem.start[0, 1]
+    right, left = road_room(problem.bounds, placed[..., 0].min(axis=1), placed[..., 0].max(axis=1), own, own, 0.0)
     l = placed[..., 1]  # noqa: E741
     return max(0.0, float(np.max(right[:, None] - l)), float(np.max(l - left[:, None])))
 

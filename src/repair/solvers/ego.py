@@ -92,12 +92,21 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
 
 @dataclass(frozen=True)
 class _Quadratic:
-    """Cached structure of a stage on one axis: free rows, factor, derivative stack."""
+    """Cached structure of the deformation on one axis, in the preconditioned coordinates y.
 
-    free: slice
-    hessian: Array  # (n, n) of lambda_s J_s, factor 2 included
-    factor_inv: Array  # (m, m): W = L^-T of the free block, so that x = x_hat + W y
+    With H = 2 lambda_s (A'A + J'J) and its free block L L', the free points are x = x_hat + W y with
+    W = L'^-1, and lambda_s J_s = y'y / 2 + the rest that the fixed points leave (W = I and y'Hy / 2
+    without preconditioning).
+    """
+
+    degree: int
+    hessian: Array  # (n, n)
+    centre: Array  # (m, p): x_hat from the fixed points
+    w: Array  # (m, m)
+    w_inverse: Array  # (m, m)
+    curvature: Array  # (m, m): W'HW
     stack: Array  # (3n - 6, n): [V; A; J] of all control points
+    stack_w: Array  # (3n - 6, m)
 
 
 @lru_cache(maxsize=128)
@@ -113,11 +122,16 @@ def _smoothness(n: int, spacing: float, weight: float) -> Array:
 
 @lru_cache(maxsize=128)
 def _deformation_structure(n: int, degree: int, spacing: float, weight: float, precondition: bool) -> _Quadratic:
-    hessian = _smoothness(n, spacing, weight)
-    free = slice(degree, n)
-    block = hessian[free, free]
-    w = np.linalg.inv(np.linalg.cholesky(block)).T if precondition else np.eye(len(block))
-    return _Quadratic(free, hessian, frozen(w), _stack(n, spacing))
+    hessian, stack = _smoothness(n, spacing, weight), _stack(n, spacing)
+    block = hessian[degree:, degree:]
+    # The straight line that the fixed points begin is the minimiser.
+    centre = -np.linalg.solve(block, hessian[degree:, :degree])
+    w_inverse = np.linalg.cholesky(block).T if precondition else np.eye(n - degree)
+    w = np.linalg.inv(w_inverse)
+    return _Quadratic(
+        degree, hessian, frozen(centre), frozen(w), frozen(w_inverse), frozen(w.T @ block @ w), stack,
+        frozen(stack[:, degree:] @ w),
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=128)
@@ -276,19 +290,14 @@ class EgoBackend:
         deadline: float | None,
     ) -> _Minimum:
         config, n = self.config, len(initial.points)
-        axes = [0, 1] if problem.lateral else [0]
         cached = _deformation_structure(n, self.degree, self.spacing, config.deform.smooth, config.precondition)
-        pairs = pairs if problem.lateral else Pairs(*(c[pairs.axis == 0] for c in pairs))
-        free, fixed = cached.free, slice(0, cached.free.start)
-        head = initial.points[fixed]
-        # Minimiser of the quadratic part: the straight line that the fixed points begin.
-        centre = np.linalg.solve(cached.hessian[free, free], -cached.hessian[free, fixed] @ head)
-        base = np.vstack([head, centre])
-        cost = _Cost(base, cached, feasibility, axes, pairs, collision, deadline)
+        head = initial.points[: self.degree]
+        base = np.vstack([head, cached.centre @ head])
         if not problem.lateral:
-            cost.base[:, 1] = initial.points[:, 1]
-        y0 = np.linalg.solve(cached.factor_inv, start[free] - base[free])[:, axes].ravel()
-        y, value, iterations, converged = self._lbfgs(cost, y0)
+            pairs = Pairs(*(c[pairs.axis == 0] for c in pairs))
+            base[:, 1] = initial.points[:, 1]
+        cost = _Cost(base, cached, feasibility, 2 if problem.lateral else 1, pairs, collision, deadline)
+        y, value, iterations, converged = self._lbfgs(cost, cost.coordinates(start))
         return _Minimum(cost.points(y), value, iterations, converged)
 
     def _bounds(
@@ -312,7 +321,7 @@ class EgoBackend:
 
         config = self.config
         y, value, info = fmin_l_bfgs_b(
-            cost, y0, maxiter=config.max_iterations, pgtol=config.tolerance, factr=1e1, m=10, maxls=40
+            cost, y0, maxiter=config.max_iterations, pgtol=config.tolerance, factr=1e7, m=10, maxls=40
         )
         return y, float(value), int(info["nit"]), info["warnflag"] != 1
 
@@ -347,60 +356,62 @@ class EgoBackend:
 
 
 class _Cost:
-    """J over the preconditioned coordinates y (flattened (m, axes))."""
+    """J over the preconditioned coordinates y, flattened (m, axes); axes is 1 for s alone, else 2."""
 
     def __init__(
         self,
         base: Array,
         cached: _Quadratic,
         feasibility: Feasibility,
-        axes: list[int],
+        axes: int,
         pairs: Pairs,
         collision: float,
         deadline: float | None,
     ) -> None:
-        self.base = base.copy()
-        self.cached, self.feasibility, self.axes, self.deadline = cached, feasibility, axes, deadline
+        self.base, self.cached, self.axes, self.deadline = base, cached, axes, deadline
+        self.feasibility = feasibility.columns(axes)
+        self.w, self.stack_w, self.curvature = cached.w, cached.stack_w, cached.curvature
+        self.derivatives = (cached.stack @ base)[:, :axes]
+        # What stays constant: the smoothness of the base, and all of l where it may not move.
+        self.constant = 0.5 * float(np.vdot(base, cached.hessian @ base))
+        if axes == 1:
+            resting = feasibility.columns(slice(1, 2)).evaluate((cached.stack @ base)[:, 1:])
+            self.constant += resting[0]
         self.pairs, self.collision = pairs, collision
-        self.base_derivatives = cached.stack @ self.base
-        # Along l without lateral freedom the reference stands, and its penalties are constants.
-        self.w = cached.factor_inv
-        self.stack_w = cached.stack[:, cached.free] @ self.w
-        self.curvature = self.w.T @ cached.hessian[cached.free, cached.free] @ self.w
-        residual = 0.5 * float(np.sum(self.base * (cached.hessian @ self.base)))
-        self.constant = residual
-        self.pair_w = self.w[pairs.row - cached.free.start]
-        self.pair_base = self.base[pairs.row, pairs.axis]
+        # d = s_f - excess of every pair is affine in y: excess = offset - rows @ y.
+        m = len(base) - cached.degree
+        rows = np.zeros((len(pairs.row), m, axes))
+        rows[np.arange(len(pairs.row)), :, pairs.axis] = pairs.sign[:, None] * cached.w[pairs.row - cached.degree]
+        self.rows = rows.reshape(len(pairs.row), m * axes)
+        self.offset = pairs.threshold - pairs.sign * (base[pairs.row, pairs.axis] - pairs.anchor)
 
     def points(self, y: Array) -> Array:
         """Control points (n, 2) at the coordinates y."""
         points = self.base.copy()
-        points[self.cached.free, self.axes] += self.w @ y.reshape(-1, len(self.axes))
+        points[self.cached.degree :, : self.axes] += self.w @ y.reshape(-1, self.axes)
         return points
+
+    def coordinates(self, points: Array) -> Array:
+        """The y of control points (n, 2) with the same fixed ones."""
+        moved = (points - self.base)[self.cached.degree :, : self.axes]
+        return (self.cached.w_inverse @ moved).ravel()
 
     def __call__(self, y: Array) -> tuple[float, Array]:
         if self.deadline is not None and time.perf_counter() > self.deadline:
             raise _OutOfTime
-        moved = y.reshape(-1, len(self.axes))
+        moved = y.reshape(-1, self.axes)
         gradient = self.curvature @ moved
         value = self.constant + 0.5 * float(np.vdot(moved, gradient))
-        derivatives = self.base_derivatives.copy()
-        derivatives[:, self.axes] += self.stack_w @ moved
-        penalty, slope = self.feasibility.evaluate(derivatives)
+        penalty, slope = self.feasibility.evaluate(self.derivatives + self.stack_w @ moved)
         if slope is not None:
             value += penalty
-            gradient += self.stack_w.T @ slope[:, self.axes]
-        pairs = self.pairs
-        if pairs.row.size:
-            where = self.pair_base + np.einsum("ij,ij->i", self.pair_w, moved[:, pairs.axis].T)
-            excess = pairs.threshold - pairs.sign * (where - pairs.anchor)
-            cost, rate = cubic_quadratic(excess, pairs.threshold)
+            gradient += self.stack_w.T @ slope
+        flat = gradient.ravel()
+        if len(self.offset):
+            cost, rate = cubic_quadratic(self.offset - self.rows @ y, self.pairs.threshold)
             value += self.collision * float(cost.sum())
-            pull = -self.collision * pairs.sign * rate
-            for k in range(len(self.axes)):
-                own = pairs.axis == k
-                gradient[:, k] += self.pair_w[own].T @ pull[own]
-        return value, gradient.ravel()
+            flat = flat - self.collision * (rate @ self.rows)
+        return value, flat
 
 
 class _RefineCost:

@@ -25,13 +25,13 @@ from repair.bspline import basis_matrix, derivative_matrix, segment_matrix
 from repair.errors import BackendError
 from repair.types import Array, frozen
 
-__all__ = ["SAMPLED", "Model", "Solution", "Structure", "bernstein_rows", "build_model"]
+__all__ = ["SAMPLED", "STANDSTILL", "Model", "Solution", "Structure", "bernstein_rows", "build_model"]
 
 #: Parameters of every sample of the nonlinear rows: the part of s, s', s'', l, l', l'' that does not
 #: depend on the unknowns, and the axis' curvature as a line in s (value, slope).
 SAMPLED = 8
 # Added to the squared speed [m²/s²] where the path's curvature divides by it.
-_STANDSTILL = 0.01
+STANDSTILL = 0.01
 _DAQP_INFEASIBLE = -1
 
 
@@ -60,6 +60,8 @@ class Structure:
     tolerance : float
     tangent : float
         Largest l' / s'.
+    overhang : float
+        Half length of the body that the road must hold [m].
     timed : bool
         The solver asks after every iteration whether there is time left.
     """
@@ -75,6 +77,7 @@ class Structure:
     max_iterations: int
     tolerance: float
     tangent: float
+    overhang: float
     timed: bool = False
 
     @property
@@ -254,9 +257,19 @@ class Model:
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
         self._kept = [np.flatnonzero(np.abs(rows.matrix[:, p:]).max(axis=1) > 1e-12) for rows in self._linear]
         matrix = _sparse(self._free_matrix())
-        g = [ca.mtimes(matrix, x), *self._nonlinear(axes, data)]
-        nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": ca.vertcat(*g)}
-        self._function = self._make_solver(nlp)
+        along, across, rest = self._nonlinear(axes, data)
+        g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
+        nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
+        # For SQP: the objective's own Hessian and the friction circles' J'J, positive definite always.
+        factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
+        circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
+        bent = factor * hessian
+        for part in (along, across):
+            slope_of = ca.jacobian(part, x)
+            bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
+        names = ["x", "p", "lam_f", "lam_g"]
+        curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
+        self._function = self._make_solver(nlp, curvature)
         shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
         self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False})
         self._qp_data = {"h": hessian, "a": matrix}
@@ -317,11 +330,12 @@ class Model:
             blocks += [np.hstack([s.tangent * free, sign * free]) for sign in (-1.0, 1.0)]
         return np.vstack(blocks)
 
-    def _nonlinear(self, axes: list[Any], data: Any) -> list[Any]:
-        """Accelerations and curvature of the driven path at the samples.
+    def _nonlinear(self, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
+        """Accelerations, curvature of the driven path, ends of the body at the samples.
 
         With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the
-        acceleration (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2).
+        acceleration (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2). The ends of a straight
+        body of half length d lie at l - kappa d^2 / 2 +- d sin(heading).
         """
         import casadi as ca
 
@@ -337,13 +351,16 @@ class Model:
         scale = 1.0 - kappa * l
         along = scale * a - 2.0 * kappa * v * w - slope * l * v**2
         across = b + scale * kappa * v**2
-        rows = [along**2 + across**2, across]
+        rest = []
         if self.structure.lateral:
             forward = scale * v
-            rows += [along, (forward * across - w * along) / (forward**2 + w**2 + _STANDSTILL) ** 1.5]
-        return rows
+            square = forward**2 + w**2 + STANDSTILL
+            middle = l - 0.5 * self.structure.overhang**2 * kappa
+            swing = self.structure.overhang * w / square**0.5
+            rest = [along, (forward * across - w * along) / square**1.5, middle + swing, middle - swing]
+        return along, across, rest
 
-    def _make_solver(self, nlp: dict[str, Any]) -> Any:
+    def _make_solver(self, nlp: dict[str, Any], curvature: Any) -> Any:
         import casadi as ca
 
         s = self.structure
@@ -361,7 +378,7 @@ class Model:
                 "print_header": False, "print_iteration": False, "print_status": False,
                 "max_iter": s.max_iterations, "tol_pr": 1e-8, "tol_du": max(s.tolerance, 1e-6),
                 "qpsol": "daqp", "qpsol_options": {"error_on_fail": False},
-                "hessian_approximation": "exact", "convexify_strategy": "eigen-clip",
+                "hessian_approximation": "exact", "hess_lag": curvature,
             }  # fmt: skip
         try:
             return ca.nlpsol("repair", s.solver, nlp, options)

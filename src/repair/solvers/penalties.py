@@ -57,6 +57,14 @@ class Feasibility:
     upper_weight: Array
     lower_weight: Array
 
+    def columns(self, chosen: int | slice) -> Feasibility:
+        """The bounds of some axes: the first ``chosen`` of them, or a slice."""
+        take = slice(chosen) if isinstance(chosen, int) else chosen
+        return Feasibility(
+            self.upper[:, take], self.lower[:, take], self.upper_joint[:, take], self.lower_joint[:, take],
+            self.upper_weight[:, take], self.lower_weight[:, take],
+        )  # fmt: skip
+
     def evaluate(self, derivatives: Array) -> tuple[float, Array | None]:
         """J_d and its gradient with respect to ``derivatives`` (R, 2); None for a gradient of zero."""
         above = derivatives - self.upper

@@ -245,17 +245,26 @@ def _tighten(
         result.upper[better, axis], result.upper_by[better, axis] = -best[better], name[better]
 
 
-def road_room(bounds: LateralBounds, low: Array, high: Array, own: Array) -> tuple[Array, Array]:
-    """Room (right, left), each (W,), that holds for all s in [low, high] (W,), never less than ``own``.
+def road_room(
+    bounds: LateralBounds,
+    low: Array,
+    high: Array,
+    own_right: Array | float,
+    own_left: Array | float,
+    edge: float,
+) -> tuple[Array, Array]:
+    """Room (right, left), each (W,), that holds for all s in [low, high] (W,).
 
     Parameters
     ----------
-    own : (2,) array
-        Smallest and largest l that is always allowed: where the reference itself is.
+    own_right, own_left : float or (W,) array
+        These values of l are always allowed: where the reference itself is.
+    edge : float
+        Distance kept from either edge [m], as far as ``own`` leaves it.
     """
     s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 9)
     right, left = bounds.at(s)
     inside = (bounds.s >= low[:, None]) & (bounds.s <= high[:, None])
     right = np.maximum(right.max(axis=1), np.where(inside, bounds.right, -np.inf).max(axis=1))
     left = np.minimum(left.min(axis=1), np.where(inside, bounds.left, np.inf).min(axis=1))
-    return np.minimum(right, own[0]), np.maximum(left, own[1])
+    return np.minimum(right + edge, own_right), np.maximum(left - edge, own_left)
