@@ -321,7 +321,7 @@ class EgoBackend:
 
         config = self.config
         y, value, info = fmin_l_bfgs_b(
-            cost, y0, maxiter=config.max_iterations, pgtol=config.tolerance, factr=1e7, m=10, maxls=40
+            cost, y0, maxiter=config.max_iterations, pgtol=config.tolerance, factr=1e3, m=10, maxls=40
         )
         return y, float(value), int(info["nit"]), info["warnflag"] != 1
 
