@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +24,7 @@ OFFICIAL_FILE = "DEU_Flensburg-6_1_T-1.xml"
 BACKENDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "ego": ("ego", ()),
     "qptr": ("qptr", ()),
+    "qptr daqp": ("qptr", ("qptr.solver=daqp",)),
     "casadi sqpmethod": ("casadi", ("casadi.solver=sqpmethod",)),
     "casadi ipopt": ("casadi", ("casadi.solver=ipopt",)),
 }
@@ -89,6 +90,13 @@ class Case:
         """The whole search, all checks included."""
         p = self.prepared
         return search_f_ttr(p.source, p.conflict, self.backend, p.checker, self.config.search)
+
+    def literal_plans(self, t_reps: Sequence[float]) -> None:
+        """The literal transcription on every open way past at ``t_reps``, whatever its verdicts are."""
+        p = self.prepared
+        for t_rep in t_reps:
+            for problem in p.source.at(t_rep):
+                literal.probe(problem, p.checker, self.config, "direct")
 
     def literal(self, check: str = "direct") -> literal.LiteralResult:
         """The same search by the literal transcription."""

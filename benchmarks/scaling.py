@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks import literal
 from benchmarks.cases import Case, Context, case, chosen_problem, scene_of
-from benchmarks.measure import Report, Spread, Target, exponent, ratio, row, together
+from benchmarks.measure import Report, Spread, Target, exponent, row, together
 from repair.api import prepare
 from repair.scene.obstacles import Obstacle
 from repair.solvers.registry import make_backend
@@ -30,7 +30,7 @@ def control_points(context: Context) -> Report:
     calls: dict[str, Callable[[], Any]] = {}
     slow: dict[int, Callable[[], Any]] = {}
     for n in POINTS:
-        config = replace(base.config, repair=replace(base.config.repair, spacing=duration / (n - 3)))
+        config = replace(base.config, repair=replace(base.config.repair, spacing=duration / (n - 3) + 1e-7))
         prepared = replace(base.prepared, config=config)
         made = Case(prepared, make_backend("ego", config), config)
         problem = chosen_problem(made)
@@ -151,5 +151,3 @@ def horizon(context: Context, backend: str) -> Report:
     report.remarks.append(f"{group}: time per plan ~ horizon^{exponent(list(made), plans):.2f}")
     return report
 
-
-__all__ = ["control_points", "horizon", "obstacles", "ratio"]

@@ -89,6 +89,7 @@ class Checker:
             official_shifts(scene.scenario),
         )  # fmt: skip
         self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
+        self._followed: tuple[Curve, float, Array] | None = None
 
     def times(self, t_end: float) -> Array:
         """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
@@ -99,8 +100,9 @@ class Checker:
     def _path(self, curve: Curve, t_end: float) -> CartesianPath:
         return self.scene.frame.cartesian(curve.sample(self.times(t_end)))
 
-    def _drive(self, path: CartesianPath) -> DrivenStates:
-        return drive(path.t, path.xy, path.heading, path.speed, path.distance, self.scene.vehicle)
+    def _drive(self, path: CartesianPath, slip: float | None = None) -> DrivenStates:
+        vehicle = self.scene.vehicle
+        return drive(path.t, path.xy, path.heading, path.speed, path.distance, vehicle, slip0=slip)
 
     def drive(self, curve: Curve, t_end: float) -> DrivenStates:
         """Consistent vehicle states along the curve, densely sampled."""
@@ -124,22 +126,46 @@ class Checker:
         return set() if contact is None else {contact.obstacle_id}
 
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
-        """Verdict on the reference until ``problem.t_rep`` followed by ``curve``."""
+        """Verdict on ``curve`` after the reference until ``problem.t_rep``.
+
+        Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
+        """
         spliced = SplicedCurve(problem.reference, curve, problem.t_rep)
-        return self._judge(self._path(spliced, problem.t_end), problem.t_rep)
+        first = max(int(np.floor(problem.t_rep / self.scene.dt + 1e-6)) - 1, 0)
+        first_sample = first * self.config.substeps
+        path = self.scene.frame.cartesian(spliced.sample(self.times(problem.t_end)[first_sample:]))
+        if not _finite(path):
+            return _NOT_FINITE
+        states = self._drive(path, self._slip(problem.reference, problem.t_end, first_sample))
+        found = self._limits(path, problem.t_rep) if self.config.limits else []
+        found += self._clear(states, first_sample)
+        # What is rejected already is not worth the drivability checker's time.
+        return Verdict(tuple(found or self._kinematics(states)))
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
-        return self._judge(self._path(reference, t_end), None)
-
-    def _judge(self, path: CartesianPath, t_rep: float | None) -> Verdict:
-        if not (np.isfinite(path.xy).all() and np.isfinite(path.heading).all()):
-            return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
+        path = self._path(reference, t_end)
+        if not _finite(path):
+            return _NOT_FINITE
         states = self._drive(path)
-        found: list[Violation] = []
-        if t_rep is not None and self.config.limits:
-            found += self._limits(path, t_rep)
-        contact = self.world.contact(states.x, states.y, states.orientation)
+        found = self._clear(states, 0)
+        until = min((violation.time for violation in found), default=float("inf"))
+        return Verdict(tuple(found + self._kinematics(states, until)))
+
+    def _slip(self, reference: Curve, t_end: float, sample: int) -> float | None:
+        """Slip angle on the reference at a dense sample; None at the start, where there is no history."""
+        if sample == 0:
+            return None
+        if self._followed is None or self._followed[0] is not reference or self._followed[1] < t_end:
+            states = self.drive(reference, t_end)
+            slip = np.arctan(self.scene.vehicle.rear / self.scene.vehicle.wheelbase * np.tan(states.steering))
+            self._followed = (reference, t_end, slip)
+        return float(self._followed[2][sample])
+
+    def _clear(self, states: DrivenStates, first_sample: int) -> list[Violation]:
+        """First contact with an obstacle and first departure from the road."""
+        found = []
+        contact = self.world.contact(states.x, states.y, states.orientation, first_sample)
         if contact is not None:
             behind = " from behind" if contact.from_behind else ""
             detail = f"obstacle {contact.obstacle_id}{behind}"
@@ -148,8 +174,7 @@ class Checker:
             index = self.road.first_off_road(states.x, states.y, states.orientation)
             if index is not None:
                 found.append(Violation(Reason.OFF_ROAD, float(states.t[index]), "the ego leaves the road"))
-        found += self._kinematics(states.every(self.config.substeps), decisive=not found)
-        return Verdict(tuple(found))
+        return found
 
     def _limits(self, path: CartesianPath, t_rep: float) -> list[Violation]:
         limits, late = self.limits, path.t >= t_rep - 1e-9
@@ -171,23 +196,23 @@ class Checker:
         broken = [text for bad, text in checks if bad]
         return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
 
-    def _kinematics(self, states: DrivenStates, decisive: bool) -> list[Violation]:
-        """Direct check first; the drivability checker decides what is left, if that still matters."""
+    def _kinematics(self, dense: DrivenStates, until: float = float("inf")) -> list[Violation]:
+        """Direct check first; the drivability checker decides what is left before ``until``."""
+        states = dense.every(self.config.substeps)
         if len(states) < 2:
             return []
         scene, official = self.scene, self.config.official
         report = direct_check(states, scene.dt, scene.vehicle)
-        open_ = np.flatnonzero(~report.ok)
-        if official == "always":
-            open_ = np.arange(len(report.ok))
-        if not len(open_):
-            return []
-        first = int(open_[0])
-        if official == "never" or not decisive:
-            return [Violation(Reason.KINEMATICS, float(states.t[first]), report.limit(first))]
-        answer = official_check(states, scene.dt, scene.vehicle, open_)
-        refused = answer.transitions[~answer.ok]
-        if not len(refused):
-            return []
-        at = int(refused[0])
-        return [Violation(Reason.KINEMATICS, float(states.t[at]), report.limit(at))]
+        open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
+        open_ = open_[states.t[open_] < until]
+        for k in open_.tolist():
+            if official == "never" or not official_check(states, scene.dt, scene.vehicle, [k]).ok.all():
+                return [Violation(Reason.KINEMATICS, float(states.t[k]), report.limit(k))]
+        return []
+
+
+_NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
+
+
+def _finite(path: CartesianPath) -> bool:
+    return bool(np.isfinite(path.xy).all() and np.isfinite(path.heading).all())
