@@ -103,6 +103,19 @@ class Case:
         p = self.prepared
         return literal.literal_search(p.source, p.conflict, p.checker, self.config, check)
 
+    def baseline(self) -> tuple[str, Callable[[], Any], str]:
+        """What this case is compared with: name, call, and the literal transcription's own answer.
+
+        It is the literal search, unless its verdicts (it only looks at inflated boxes) end that after fewer
+        t_rep than the package visits; then the same work: a literal repair for every repair of the package.
+        """
+        slow, visited = self.literal(), [p.t_rep for p in self.search().probes]
+        answer = f"F-TTR {slow.f_ttr:g} s, {len(slow.probes)} plans" if slow.f_ttr is not None else "no F-TTR"
+        if len({p.t_rep for p in slow.probes}) >= len(visited):
+            return "literal search", self.literal, answer
+        note = f"at the {len(visited)} t_rep of ego; its own search: {answer}"
+        return "literal plans", lambda: self.literal_plans(visited), note
+
 
 def case(path: Path, number: int, backend: str, *overrides: str, scene: Scene | None = None) -> Case:
     """Prepare a scenario for a backend (a name of :data:`BACKENDS`), with the preset of that scenario."""
@@ -126,5 +139,3 @@ def chosen_problem(made: Case, t_rep: float = 0.0) -> Any:
             return problem
     return problems[0]
 
-
-Runner = Callable[[Context], Any]

@@ -55,6 +55,7 @@ def crime_ttr(job):
     shape, name = Rectangle(length=4.298, width=1.674), 99999
     prediction = TrajectoryPrediction(Trajectory(1, states), shape)
     scenario.add_objects(DynamicObstacle(name, ObstacleType.CAR, shape, first, prediction))
+    scenario.assign_obstacles_to_lanelets()
 
     def make():
         config = CriMeConfiguration()
@@ -73,9 +74,10 @@ def reactive_planner(job):
     """commonroad-reactive-planner: one replan from t = 0 along the path, 60 steps, one process."""
     import numpy as np
     from commonroad.common.file_reader import CommonRoadFileReader
+    from commonroad_clcs.config import CLCSParams
     from commonroad_rp.reactive_planner import ReactivePlanner
-    from commonroad_rp.state import ReactivePlannerState
     from commonroad_rp.utility.config import ReactivePlannerConfiguration
+    from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem
 
     scenario, problems = CommonRoadFileReader(job["scenario"]).open()
     problem = next(iter(problems.planning_problem_dict.values()))
@@ -84,10 +86,8 @@ def reactive_planner(job):
     config.debug.logging_level = "CRITICAL"
     config.update(scenario=scenario, planning_problem=problem)
     planner = ReactivePlanner(config)
-    planner.set_reference_path(np.array(job["path"]))
-    start = ReactivePlannerState.create_from_initial_state(
-        problem.initial_state, config.vehicle.wheelbase, config.vehicle.wb_rear_axle
-    )
+    planner.set_reference_path(coordinate_system=CoordinateSystem(np.array(job["path"]), clcs_params=CLCSParams()))
+    start = planner.x_0  # made of the problem's initial state by the constructor
 
     def replan():
         planner.reset(initial_state_cart=start, collision_checker=planner.collision_checker,

@@ -46,6 +46,8 @@ SOLVING = {
         "NLP look-up": "repair.solvers.casadi_nlp:build_model",
         "NLP layout": "repair.solvers.casadi_nlp:CasadiBackend._instance",
         "separation": "repair.solvers.casadi_nlp:separate",
+        "rounds of windows": "repair.solvers.casadi_nlp:CasadiBackend._open",
+        "residuals": "repair.solvers.casadi_nlp:CasadiBackend._residuals",
         "QP (presolve)": "repair.solvers.nlp_model:Model.presolve",
         "NLP solve": "repair.solvers.nlp_model:Model.solve",
         "rest of the solve": "repair.solvers.casadi_nlp:CasadiBackend.solve",
@@ -138,7 +140,8 @@ def shares(context: Context, number: int, backend: str) -> Report:
     kind = backend.split()[0]
     targets = {**SOLVING[kind], **CHECKS}
     parts, whole = _shares(made.search, targets, context.rounds(41, 9))
-    slow_parts, slow_whole = _shares(made.literal, LITERAL, context.rounds(5, 2))
+    label, run, _ = case(context.path(number), number, "ego").baseline()
+    slow_parts, slow_whole = _shares(run, LITERAL, context.rounds(5, 2))
     base = Spread.of(slow_whole).median
     group = f"phases of a search: {context.title(number)}, {backend}, Delta T 0.4 s"
     report = Report()
@@ -151,11 +154,11 @@ def shares(context: Context, number: int, backend: str) -> Report:
             continue
         cpu = Spread.of(spent).scaled(1e3)
         own = COUNTERPART.get(name) if kind == "ego" else None
-        slow = Spread.of(slow_parts[own]).median if own else base
-        compared = Spread.of(slow / np.maximum(spent, 1e-9))
-        against = "literal, same phase" if own else "literal search"
+        slow = Spread.of(slow_parts[own]).median if own else 0.0
+        compared = Spread.of((slow or base) / np.maximum(spent, 1e-9))
+        against = "literal, same phase" if slow else label
         report.rows.append(Row(group, name, "ms", cpu, None, compared, against, f"{100 * cpu.median / total.median:.0f} %"))
-    report.rows.append(Row(group, "whole, with the stopwatch", "ms", total, None, Spread.of(base / np.asarray(whole)), "literal search"))
+    report.rows.append(Row(group, "whole, with the stopwatch", "ms", total, None, Spread.of(base / np.asarray(whole)), label))
     if kind == "ego":
         solving = sum(np.asarray(parts[name]) for name in ("deformation", "refinement") if name in parts)
         slow = Spread.of(slow_parts["optimisation"]).median
@@ -192,10 +195,11 @@ def preparation(context: Context, number: int) -> Report:
     }
     group = f"once for a scene: {context.title(number)}"
     rounds = context.rounds(9, 3)
-    slow = together({"": made.literal}, context.rounds(5, 2), warm_up=1)[""]
+    label, run, _ = made.baseline()
+    slow = together({"": run}, context.rounds(5, 2), warm_up=1)[""]
     base = Times((Spread.of(slow.cpu).median,) * rounds, (Spread.of(slow.wall).median,) * rounds)
     times = together(calls, rounds, warm_up=1)
-    return Report([row(group, name, times[name], base, "literal search") for name in calls])
+    return Report([row(group, name, times[name], base, label) for name in calls])
 
 
 def parts(context: Context, number: int) -> Report:

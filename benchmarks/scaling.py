@@ -17,7 +17,7 @@ from repair.solvers.registry import make_backend
 
 POINTS = (20, 40, 80, 160, 320)
 COUNTS = (1, 5, 20, 50, 100, 200, 500)
-HORIZONS = (2.0, 3.0, 4.0, 6.0, 8.0)
+HORIZONS = (3.0, 4.0, 5.0, 6.0, 8.0)
 #: Beyond this the literal transcription would take minutes.
 LITERAL_POINTS = 40
 

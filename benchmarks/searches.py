@@ -9,7 +9,6 @@ from benchmarks.cases import BACKENDS, Context, case, chosen_problem, verdict
 from benchmarks.measure import Report, Target, ratio, row, rounds_within, together
 from repair.errors import RepairError
 
-LITERAL, LITERAL_PLANS = "literal search", "literal plans"
 # Times faster than the literal transcription, on Scenario 1 at Delta T = 0.4 s.
 WANTED = {"ego": 60.0, "qptr": 100.0, "casadi sqpmethod": 12.0, "casadi ipopt": 4.0}
 
@@ -27,13 +26,7 @@ def whole_search(context: Context, number: int, delta_t: float) -> Report:
             report.remarks.append(f"{group}: {name} left out: {error}")
             made.pop(name, None)
     base = made["ego"]
-    slow, visited = base.literal(), [p.t_rep for p in base.search().probes]
-    label, run = LITERAL, base.literal
-    note = f"F-TTR {slow.f_ttr:g} s, {len(slow.probes)} plans" if slow.f_ttr is not None else "no F-TTR"
-    if {p.t_rep for p in slow.probes} != set(visited) and len(slow.probes) < len(visited):
-        # Its verdicts end it early: it only looks at inflated boxes. What is compared is the same work.
-        label, note = LITERAL_PLANS, f"at the {len(visited)} t_rep of ego; its own search: {note}"
-        run = lambda: base.literal_plans(visited)  # noqa: E731
+    label, run, note = base.baseline()
     times = together(
         {label: run, **{name: c.search for name, c in made.items()}},
         rounds_within(run, context.rounds(8, 2), 3, context.rounds(21, 5)),
@@ -46,7 +39,7 @@ def whole_search(context: Context, number: int, delta_t: float) -> Report:
             report.targets.append(_faster(f"search on Scenario 1, {name}", WANTED[name], got))
     if number == 1 and delta_t == 0.4 and not context.quick:
         official = together({"": lambda: base.literal("official")}, 2, warm_up=0)[""]
-        report.rows.append(row(group, LITERAL + ", drivability checker", official, note="the paper's kinematic check"))
+        report.rows.append(row(group, "literal search, drivability checker", official, note="the paper's kinematic check"))
     return report
 
 

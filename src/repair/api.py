@@ -13,7 +13,7 @@ import numpy as np
 
 from repair.checker import Checker, SplicedCurve
 from repair.config import Config, load_config
-from repair.errors import RepairError
+from repair.errors import ConfigError, RepairError
 from repair.kinematics import DrivenStates
 from repair.metrics import Peaks
 from repair.occupancy import build_occupancy, first_entry, shrink_to_start
@@ -155,6 +155,10 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     wanted = config.repair.horizon
     if wanted is None:
         wanted = conflict.time + config.repair.after_conflict
+    elif np.isfinite(conflict.time) and wanted <= conflict.time:
+        raise ConfigError(
+            f"repair.horizon is {wanted:g} s, but the conflict is at {conflict.time:g} s: a repair has to reach beyond it"
+        )
     t_end = min(wanted, t_reference)
     t_end = max(np.floor(t_end / scene.dt + 1e-6) * scene.dt, min(scene.dt, t_reference))
     return Prepared(

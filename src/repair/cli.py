@@ -38,6 +38,7 @@ class Verb:
 
 VERBS: tuple[Verb, ...] = (
     Verb("run", "repair one scenario: TTC, F-TTR, a checked trajectory", verbs.run_arguments, verbs.run),
+    Verb("certify", "recompute every margin of a written result", verbs.certify_arguments, verbs.certify),
     Verb("sweep", "repair all scenarios of a folder", verbs.sweep_arguments, verbs.sweep),
     Verb("table1", "the paper's Table I, paper and ours", verbs.table1_arguments, verbs.table1),
     Verb("table2", "the paper's Table II, times on this machine", verbs.table2_arguments, verbs.table2),

@@ -368,13 +368,14 @@ def _check_sections(layer: str, node: Any, schema: Any, prefix: str = "") -> Non
 
 def _read_yaml(path: Path) -> Any:
     from omegaconf import DictConfig, OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
     from yaml import YAMLError
 
     try:
         layer = OmegaConf.load(path)
     except FileNotFoundError as error:
         raise ConfigError(f"configuration file {path} does not exist") from error
-    except (OSError, YAMLError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ConfigError(f"configuration file {path} cannot be read: {first}") from error
     if not isinstance(layer, DictConfig):

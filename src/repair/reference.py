@@ -18,12 +18,13 @@ import numpy.typing as npt
 
 from repair.bspline import UniformBSpline, basis_matrix, fit_to_curve, n_points_for, splice_points
 from repair.config import ReferenceConfig
-from repair.errors import ReferenceTrajectoryError
+from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError
 from repair.types import Array, Curve, FrenetTrajectory, Occupancy, frozen
 
 if TYPE_CHECKING:
     from repair.scene.commonroad import Scene
 
+_GRID_MAX = 2e8  # edges that the graph search may look at: a few seconds
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
 __all__ = ["SpeedProfile", "known_until", "make_reference", "plan_speed", "recorded_positions"]
@@ -180,6 +181,12 @@ def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> U
     if desired is None:
         desired = max(v0, _limit_at(scene, s0))
     lattice = _lattice(v0, max(desired, v0), config, n_layers)
+    edges = lattice.n_speeds * lattice.n_positions * len(lattice.changes) * max(n_layers, 10)
+    if edges > _GRID_MAX:
+        raise ConfigError(
+            f"{scene.id}: the reference planner would look at {edges:.1g} edges, at most {_GRID_MAX:.0g}; choose a larger "
+            f"reference.speed_step ({config.speed_step:g} m/s) or reference.time_step ({config.time_step:g} s)"
+        )
     positions = s0 + lattice.unit * np.arange(lattice.n_positions)
     node_cost = _node_cost(scene, config, lattice, positions, desired)
     blocked = _blocked(config, occupancy, positions, n_layers)

@@ -141,7 +141,22 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-# -- sweep, tables, figures -----------------------------------------------------------------------------
+# -- certify, sweep, tables, figures ---------------------------------------------------------------
+
+
+def certify_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair certify``."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="what `repair run --out DIR` wrote")
+
+
+def certify(arguments: argparse.Namespace) -> int:
+    """Exit status 1 where a margin is violated."""
+    from repair.certify import certify as recompute
+    from repair.certify import format_certificate
+
+    certificate = recompute(arguments.folder)
+    print(format_certificate(certificate))
+    return 0 if certificate.ok else 1
 
 
 def sweep_arguments(parser: argparse.ArgumentParser) -> None:

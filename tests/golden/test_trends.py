@@ -59,7 +59,7 @@ def with_speed(scene: Scene, speed: float) -> Scene:
             (2.25, 3.0),
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="the soft penalty gives up part of the margin, and the checker judges true rectangles: "
+                reason="soft penalties give up part of the margin; the checker judges true rectangles: "
                 "with S_offset 2.25 m (half the vehicle + 0.1 m) 2.0 s touches, with 3 m not",
             ),
         ),

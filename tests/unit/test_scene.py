@@ -386,7 +386,7 @@ def test_malformed_files(tmp_path: Path) -> None:
     cases = {
         "empty.xml": ("", "is empty"),
         "text.xml": ("no xml at all", "is not XML"),
-        "cut.xml": ("<commonRoad timeStepSize='0.1'><lanelet id='1'>", "cannot read it"),
+        "cut.xml": ("<commonRoad timeStepSize='0.1'><lanelet id='1'>", "is not XML"),
         "other.xml": ("<html/>", "not a CommonRoad file"),
         "bomb.xml": (bomb, "DOCTYPE"),
         "dt.xml": ("<commonRoad timeStepSize='0'/>", "time step"),

@@ -1,9 +1,9 @@
 """One strictly convex QP through qpsolvers, with the answer checked against the problem itself.
 
 The solvers report in words of their own and not all of them are right, so: a solution counts when
-its residuals and its duality gap, recomputed here, are small, whatever it is called; "no solution" counts when a linear program agrees that the
-constraints have no common point. A solver that fails this on small problems with known answers is
-refused by name.
+its residuals and its duality gap, recomputed here, are small, whatever it is called; "no solution"
+counts when a linear program agrees that the constraints have no common point. A solver that fails
+this on small problems of known answer is refused by name.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ OPTIMAL = 1e-4
 _SETTINGS: dict[str, dict[str, Any]] = {
     "osqp": {
         "eps_abs": 1e-6,
-        "eps_rel": 1e-6,
+        "eps_rel": 1e-8,
         "eps_prim_inf": 1e-7,
         "max_iter": 50_000,
         "polishing": True,

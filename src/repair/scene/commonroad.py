@@ -19,6 +19,7 @@ from repair.scene.lead_in import drive_path
 from repair.scene.obstacles import Obstacle, last_predicted_step, obstacles_of
 from repair.scene.route import Lane, Route, lanes_of, plan_route
 from repair.scene.vehicle import Vehicle, load_vehicle
+from repair.scene.shapes import FAR
 from repair.types import Array, LateralBounds, frozen
 
 __all__ = ["InitialState", "Scene", "SpeedLimit", "load_scene", "scene_from_scenario"]
@@ -26,6 +27,8 @@ __all__ = ["InitialState", "Scene", "SpeedLimit", "load_scene", "scene_from_scen
 _HORIZON_MAX = 10.0  # unless the caller wants another [s]
 _HORIZON_DEFAULT = 5.0  # where neither a prediction nor a goal time says how long [s]
 _ROUTE_MAX = 400.0  # road ahead of the ego that is looked at [m]
+_STEPS_MAX = 10**9  # of the initial time step
+_SPEED = (-0.1, 100.0)  # initial speeds that can be dealt with [m/s]
 
 
 @dataclass(frozen=True)
@@ -178,7 +181,7 @@ def load_scene(
         id=contents.benchmark_id,
         path=contents.path,
         sha256=contents.sha256,
-        notes=(*note, *scene.notes),
+        notes=(*contents.notes, *note, *scene.notes),
     )
 
 
@@ -215,8 +218,8 @@ def _build(
     if not (np.isfinite(smoothing) and smoothing > 0.0):
         raise ConfigError(f"smoothing is {smoothing!r} m; it has to be positive")
     dt = float(scenario.dt)
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise ScenarioError(f"the time step is {dt!r} s; it has to be positive")
+    if not 1e-3 <= dt <= 10.0:
+        raise ScenarioError(f"the time step is {dt!r} s; it has to be positive, from 0.001 to 10 s")
     ego = _initial_state(problem.initial_state)
     first_step = _first_step(problem.initial_state)
     n_steps = _steps_considered(scenario, problem, dt, first_step, horizon, after)
@@ -271,12 +274,24 @@ def _initial_state(state: Any) -> InitialState:
     numbers = [float(position[0]), float(position[1]), *values]
     if not np.isfinite(numbers).all():
         raise ScenarioError("the planning problem's initial state is not finite")
-    return InitialState(*numbers)
+    made = InitialState(*numbers)
+    if max(abs(made.x), abs(made.y)) > FAR:
+        raise ScenarioError(f"the ego's initial position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out")
+    if not _SPEED[0] <= made.velocity <= _SPEED[1]:
+        raise ScenarioError(
+            f"the ego's initial speed is {made.velocity:g} m/s; it has to be from 0 to {_SPEED[1]:g} m/s"
+        )
+    return made
 
 
 def _first_step(state: Any) -> int:
-    step = state.time_step
-    return int(step.start if hasattr(step, "start") else step)
+    step = getattr(state, "time_step", None)
+    if step is None:
+        raise ScenarioError("the planning problem's initial state has no time step")
+    first = int(step.start if hasattr(step, "start") else step)
+    if not 0 <= first <= _STEPS_MAX:
+        raise ScenarioError(f"the planning problem starts at time step {first}; CommonRoad counts from 0")
+    return first
 
 
 def _steps_considered(

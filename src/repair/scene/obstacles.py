@@ -8,6 +8,9 @@ What CommonRoad leaves open is settled here, towards the larger occupancy:
 - a dynamic obstacle without a prediction stands where it is (noted);
 - a set-based occupancy over [k, k + 1] counts at k and at k + 1;
 - after its prediction an obstacle is gone (CommonRoad's own reading), or held, or moves on.
+
+A prediction with a hole, or with steps out of order, is refused: commonroad-io and the drivability
+checker count its states instead of reading their time steps, and would put the obstacle elsewhere.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ import numpy as np
 
 from repair.errors import ConfigError, ScenarioError
 from repair.scene.shapes import (
+    FAR,
     Placed,
     enclosing,
     interval,
@@ -35,6 +39,8 @@ from repair.types import Array, frozen
 __all__ = ["AFTER_PREDICTION", "Obstacle", "last_predicted_step", "obstacles_of"]
 
 AFTER_PREDICTION = ("remove", "hold", "constant_velocity")
+
+_LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
 
 @dataclass(frozen=True)
@@ -84,17 +90,27 @@ class Obstacle:
 
 
 def _position(state: Any) -> Array:
-    position = state.position
+    position = getattr(state, "position", None)
+    if position is None:
+        raise ScenarioError("a state of it has no position")
     if hasattr(position, "center") or hasattr(position, "shapes"):
         return np.asarray(np.mean(np.concatenate(outlines(position, np.zeros(2), 0.0)), axis=0))
     return np.asarray(position, dtype=np.float64)[:2]
 
 
 def _attribute(state: Any, name: str) -> Any:
-    value = getattr(state, name, None)
-    if value is None and name == "velocity":
-        return np.nan
-    return value
+    """A value of the state's own; what commonroad-io would derive from others is not one.
+
+    Its ``velocity_y`` of a state with an orientation is along the y axis, not across the body, and
+    fails for intervals; so does the orientation of a point mass.
+    """
+    if name in vars(state):
+        return getattr(state, name)
+    if name == "orientation" and not any(
+        hasattr(_attribute(state, v), "start") for v in ("velocity", "velocity_y")
+    ):
+        return getattr(state, name, None)
+    return None
 
 
 def _headings(states: Sequence[Any]) -> list[tuple[float, float]]:
@@ -115,8 +131,8 @@ def _headings(states: Sequence[Any]) -> list[tuple[float, float]]:
 
 
 def _state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Placed:
-    speed = sum(interval(_attribute(state, "velocity"))) / 2.0
-    lateral = getattr(state, "velocity_y", None)
+    forward, lateral = _attribute(state, "velocity"), _attribute(state, "velocity_y")
+    speed = np.nan if forward is None else sum(interval(forward)) / 2.0
     if lateral is not None:
         speed = float(np.hypot(speed, sum(interval(lateral)) / 2.0))
     position = state.position
@@ -131,8 +147,11 @@ def _steps(value: Any) -> tuple[int, int]:
     return int(np.floor(low)), int(np.ceil(high))
 
 
-def _timeline(obstacle: Any) -> tuple[dict[int, Placed], str]:
-    """Occupancies by the scenario's own time steps, and the role."""
+def _timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], str]:
+    """Occupancies by the scenario's own time steps, and the role.
+
+    Of an occupancy that holds over an interval, only the steps around ``first`` to ``last``.
+    """
     prediction = getattr(obstacle, "prediction", None)
     initial = getattr(obstacle, "initial_state", None)
     trajectory = getattr(prediction, "trajectory", None)
@@ -141,6 +160,7 @@ def _timeline(obstacle: Any) -> tuple[dict[int, Placed], str]:
     if initial is not None:
         states[_steps(initial.time_step)[0]] = initial
     if trajectory is not None:
+        _check_order([_steps(s.time_step) for s in trajectory.state_list], states)
         for state in trajectory.state_list:
             states.setdefault(_steps(state.time_step)[0], state)
     if states:
@@ -158,37 +178,46 @@ def _timeline(obstacle: Any) -> tuple[dict[int, Placed], str]:
                 )
                 placed[step] = _state_occupancy(body, states[step], heading)
     if prediction is not None and trajectory is None:
+        _check_order([_steps(o.time_step) for o in prediction.occupancy_set], states)
         for occupancy in prediction.occupancy_set:
             low, high = _steps(occupancy.time_step)
             item = occupied(occupancy.shape)
-            for step in range(low, high + 1):
+            for step in range(max(low, min(first, high) - 1), min(high, last) + 1):
                 before = placed.get(step)
                 placed[step] = item if before is None else union(before, item)
         return placed, "phantom" if initial is None else "set_based"
     return placed, "dynamic"
 
 
+def _check_order(steps: Sequence[tuple[int, int]], initial: Iterable[int]) -> None:
+    """Time steps of a prediction: from the initial one on, in order, without a hole."""
+    before = list(initial)[:1]
+    if before and steps and steps[0][0] > before[0] + 1:
+        raise ScenarioError(f"its prediction starts at time step {steps[0][0]}, its initial state at {before[0]}")
+    for (low, high), (following, _) in zip(steps, steps[1:], strict=False):
+        if not low < following <= high + 1:
+            raise ScenarioError(f"its prediction goes from time step {high} to {following}")
+
+
 # ---------------------------------------------------------------------- arrays
 
 
-def _filled(
-    rows: list[Placed | None], after: str, dt: float, *, before_last: Placed | None = None
+def _continued(
+    rows: list[Placed | None], timeline: dict[int, Placed], first: int, after: str, dt: float
 ) -> list[Placed | None]:
-    """Continue past the last known row."""
-    known = [k for k, row in enumerate(rows) if row is not None]
+    """Rows from step ``first`` on, continued past the last known one, also where that was earlier."""
+    known = [step for step in timeline if step < first + len(rows)]
     if after == "remove" or not known:
         return rows
-    last = known[-1]
-    item = rows[last]
-    assert item is not None
-    previous = rows[last - 1] if last > 0 else before_last
+    last = max(known)
+    item, previous = timeline[last], timeline.get(last - 1)
     shift = np.zeros(2)
     if after == "constant_velocity":
         if np.isfinite(item.state[3]) and np.isfinite(item.state[2]):
             shift = item.state[3] * dt * np.array([np.cos(item.state[2]), np.sin(item.state[2])])
         elif previous is not None:
             shift = np.subtract(item.state[:2], previous.state[:2])
-    return [row if k <= last else item.moved((k - last) * shift) for k, row in enumerate(rows)]
+    return [row if k <= last else item.moved((k - last) * shift) for k, row in enumerate(rows, start=first)]
 
 
 def _rigid_outline(rectangles: Array) -> Array | None:
@@ -250,12 +279,19 @@ def _repeated(obstacle: Obstacle, count: int) -> Obstacle:
     )
 
 
-def _checked(name: int, placed: Iterable[Placed]) -> None:
+def _checked(placed: Iterable[Placed]) -> None:
     for item in placed:
-        numbers = [*(item.rectangle or ()), *(item.circle or ()), *item.state[:2]]
-        finite = np.isfinite(numbers).all() and all(np.isfinite(p).all() for p in item.polygons or ())
-        if not finite:
-            raise ScenarioError(f"obstacle {name} has a state or shape that is not finite")
+        places = [np.asarray(item.state[:2]), *(item.polygons or ())]
+        places += [np.asarray(shape[:2]) for shape in (item.rectangle, item.circle) if shape]
+        sizes = [*(item.rectangle or ())[3:], *(item.circle or ())[2:]]
+        sizes += [float(np.max(np.ptp(p, axis=0))) / 2.0 for p in item.polygons or ()]
+        angle = item.rectangle[2] if item.rectangle else 0.0
+        if not (np.isfinite([*sizes, angle]).all() and all(np.isfinite(p).all() for p in places)):
+            raise ScenarioError("a state or shape of it is not finite")
+        if not 0.0 < min(sizes) <= max(sizes) <= _LARGEST:
+            raise ScenarioError(f"its size is {2.0 * min(sizes):g} to {2.0 * max(sizes):g} m")
+        if max(float(np.max(np.abs(p))) for p in places) > FAR:
+            raise ScenarioError(f"it is farther than {FAR:g} m out")
 
 
 def _all(scenario: Any) -> list[Any]:
@@ -325,19 +361,18 @@ def obstacles_of(
     notes: list[str] = []
     for obstacle in _all(scenario):
         name = int(obstacle.obstacle_id)
+        try:
+            placed, role = _placed(obstacle, first_step, first_step + n_steps)
+        except ScenarioError as error:
+            raise ScenarioError(f"obstacle {name}: {error}") from error
         kind = str(getattr(getattr(obstacle, "obstacle_type", None), "value", "unknown"))
-        still = _standing(obstacle)
-        if still is not None:
-            role, placed = still
-            _checked(name, [placed])
+        if isinstance(placed, Placed):
             if role == "dynamic":
                 notes.append(f"obstacle {name} has no prediction and is taken to stand still")
             found.append(_arrays(name, kind, role, [placed], n_steps + 1))
             continue
-        timeline, role = _timeline(obstacle)
-        _checked(name, timeline.values())
-        rows = [timeline.get(first_step + k) for k in range(n_steps + 1)]
-        rows = _continued(rows, timeline, first_step, after_prediction, float(scenario.dt))
+        rows = [placed.get(first_step + k) for k in range(n_steps + 1)]
+        rows = _continued(rows, placed, first_step, after_prediction, float(scenario.dt))
         if not any(row is not None for row in rows):
             notes.append(f"obstacle {name} is never there within the horizon")
             continue
@@ -358,19 +393,21 @@ def obstacles_of(
     return tuple(found), ego, notes
 
 
-def _continued(
-    rows: list[Placed | None], timeline: dict[int, Placed], first: int, after: str, dt: float
-) -> list[Placed | None]:
-    if after == "remove" or not timeline:
-        return rows
-    last = max(timeline)
-    if last < first:  # the prediction ended before the start
-        item = timeline[last]
-        moved = _filled(
-            [item] + [None] * (first - last + len(rows) - 1), after, dt, before_last=timeline.get(last - 1)
-        )
-        return moved[first - last :]
-    return _filled(rows, after, dt, before_last=timeline.get(first - 1))
+def _placed(obstacle: Any, first: int, last: int) -> tuple[Placed | dict[int, Placed], str]:
+    """Where an obstacle is, for good or by time step, and its role.
+
+    Raises
+    ------
+    ScenarioError
+        Without the obstacle's name.
+    """
+    still = _standing(obstacle)
+    if still is not None:
+        _checked([still[1]])
+        return still[1], still[0]
+    timeline, role = _timeline(obstacle, first, last)
+    _checked(timeline.values())
+    return timeline, role
 
 
 def _standing(obstacle: Any) -> tuple[str, Placed] | None:

@@ -8,24 +8,36 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from repair.errors import ScenarioError
 
-__all__ = ["FileContents", "read_file"]
+__all__ = ["FileContents", "read_file", "read_xml"]
 
 _SIZE_MAX = 200_000_000  # bytes
+_TIME_STEP = (1e-3, 10.0)  # smallest and largest [s]
+_NEEDED = {
+    "planningProblem": ("position", "orientation", "velocity", "time"),
+    "dynamicObstacle": ("position", "orientation", "velocity", "time"),
+    "staticObstacle": ("position", "orientation"),
+}
+_KNOWN = frozenset(
+    {"location", "scenarioTags", "lanelet", "trafficSign", "trafficLight", "intersection", "obstacle",
+     "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem"}
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class FileContents:
-    """A parsed file: CommonRoad objects, and what identifies the file."""
+    """A parsed file: CommonRoad objects, what identifies the file, and what commonroad-io left out."""
 
     path: Path
     benchmark_id: str
     sha256: str
     scenario: Any
     problems: Mapping[int, Any]
+    notes: tuple[str, ...] = ()
 
 
 class _Stop(Exception):
@@ -70,9 +82,26 @@ def _root(data: bytes, name: str) -> tuple[str, dict[str, str]]:
         parser.Parse(data, True)
     except _Stop:
         pass
-    except expat.ExpatError as error:
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: its encoding
         raise ScenarioError(f"{name} is not XML: {error}") from error
     return found[0]
+
+
+def read_xml(path: Path, *, size_limit: int = _SIZE_MAX) -> tuple[bytes, str, dict[str, str]]:
+    """Read a file that has to be XML without document type declarations, and so without entities.
+
+    Returns
+    -------
+    data, tag, attributes
+        The file's bytes, and tag and attributes of its root element.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read, is empty or too large, does not begin as XML, or has a DOCTYPE.
+    """
+    data = _bytes(path, size_limit)
+    return data, *_root(data, path.name)
 
 
 def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
@@ -83,11 +112,11 @@ def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
     ScenarioError
         Whatever is wrong with it, in one sentence that names the file.
     """
-    data = _bytes(path, size_limit)
-    tag, attributes = _root(data, path.name)
+    data, tag, attributes = read_xml(path, size_limit=size_limit)
     if tag != "commonRoad":
         raise ScenarioError(f"{path.name} is not a CommonRoad file: its root element is <{tag}>")
     _check_time_step(attributes.get("timeStepSize"), path.name)
+    notes = _check_elements(data, path.name)
 
     try:
         with warnings.catch_warnings():
@@ -107,15 +136,39 @@ def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
         sha256=hashlib.sha256(data).hexdigest(),
         scenario=scenario,
         problems=problems.planning_problem_dict,
+        notes=notes,
     )
 
 
 def _check_time_step(text: str | None, name: str) -> None:
     try:
-        positive = text is not None and 0.0 < float(text) < float("inf")
+        usable = text is not None and _TIME_STEP[0] <= float(text) <= _TIME_STEP[1]
     except ValueError:
-        positive = False
-    if not positive:
+        usable = False
+    if not usable:
         raise ScenarioError(
-            f"{name}: the time step (timeStepSize) is {text!r}; it has to be a positive number"
+            f"{name}: the time step (timeStepSize) is {text!r}; it has to be a positive number of seconds, "
+            f"from {_TIME_STEP[0]:g} to {_TIME_STEP[1]:g}"
         )
+
+
+def _check_elements(data: bytes, name: str) -> tuple[str, ...]:
+    """Refuse what commonroad-io would make up, and note what it would leave out without a word.
+
+    It fills whatever an initial state lacks with zeros, and then no longer reads what follows: a missing
+    orientation takes the speed along.
+    """
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise ScenarioError(f"{name} is not XML: {error}") from error
+    for owner in root:
+        tag = f"{owner.findtext('role', 'dynamic')}Obstacle" if owner.tag == "obstacle" else owner.tag
+        state = owner.find("initialState")
+        missing = [c for c in _NEEDED.get(tag, ()) if state is not None and state.find(c) is None]
+        if missing:
+            raise ScenarioError(
+                f"{name}: the initial state of {owner.tag} {owner.get('id')} has no {' and no '.join(missing)}"
+            )
+    unknown = sorted({str(e.tag) for e in root} - _KNOWN)
+    return (f"elements that are not CommonRoad's are ignored: {', '.join(unknown)}",) if unknown else ()

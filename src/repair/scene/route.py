@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from repair.errors import ScenarioError
+from repair.scene.shapes import FAR
 from repair.types import Array, frozen
 
 __all__ = ["Lane", "Route", "lanes_of", "plan_route"]
@@ -89,6 +90,8 @@ def lanes_of(network: Any) -> tuple[dict[int, Lane], list[str]]:
         )
         if not all(np.isfinite(v).all() for v in (left, center, right)):
             raise ScenarioError(f"lanelet {name} has a vertex that is not finite")
+        if not all((np.abs(v) <= FAR).all() for v in (left, center, right)):
+            raise ScenarioError(f"lanelet {name} has a vertex farther than {FAR:g} m out")
         length = float(np.sum(np.hypot(*np.diff(center, axis=0).T)))
         if length < 0.05:
             notes.append(f"lanelet {name} has no length and is ignored")

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from repair.types import Array
 
 __all__ = [
+    "FAR",
     "Placed",
     "enclosing",
     "interval",
@@ -24,6 +25,9 @@ __all__ = [
     "subdivided",
     "union",
 ]
+
+FAR = 1e8
+"""Coordinates beyond this [m] are no place on Earth, and leave no digits for what happens there."""
 
 _EDGE = 2.0  # outline points are at most this far apart [m]
 _CORNERS = 16  # of the polygon circumscribed about a circle

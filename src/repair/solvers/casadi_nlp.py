@@ -28,7 +28,7 @@ import numpy as np
 from repair.bspline import UniformBSpline, fit_to_curve, n_points_for, splice_points
 from repair.config import CasadiConfig, Config
 from repair.errors import BackendError
-from repair.solvers.nlp_model import STANDSTILL, Model, Structure, build_model
+from repair.solvers.nlp_model import STANDSTILL, Model, Solution, Structure, build_model
 from repair.solvers.separation import Separation, Windows, road_room, separate
 from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, SolveResult, SolveStatus, frozen
 
@@ -296,12 +296,12 @@ class CasadiBackend:
         model = instance.model
         x0, slope, data = model.unknowns(points), self._slope(instance), self._sample_data(instance, points)
         solution = model.solve(x0, data, slope, low, high, deadline)
-        status, word = _status(model, solution.word), solution.word
+        status, word = _status(model, solution), solution.word
         if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
             # An SQP that does not converge proves nothing; IPOPT has the last word.
             oracle = build_model(replace(model.structure, solver="ipopt"))
             solution = oracle.solve(x0, data, slope, low, high, deadline)
-            status, word = _status(oracle, solution.word), f"{word}, then IPOPT: {solution.word}"
+            status, word = _status(oracle, solution), f"{word}, then IPOPT: {solution.word}"
         return model.with_unknowns(points, solution.x), status, word, solution.iterations
 
     def _bounds(
@@ -320,8 +320,8 @@ class CasadiBackend:
                 upper[k] = separation.upper[:, rows.axis] - shift
                 if trust is not None and rows.axis == 0:
                     here = rows.matrix @ around[:, 0]
-                    lower[k] = np.maximum(lower[k], here - trust)
-                    upper[k] = np.minimum(upper[k], here + trust)
+                    lower[k] = np.maximum(lower[k], np.minimum(here - trust, upper[k]))
+                    upper[k] = np.minimum(upper[k], np.maximum(here + trust, lower[k]))
         if instance.problem.lateral:
             ends = _room_of_ends(instance, around, min(_ROAD_SLACK, trust or _INF), _EDGE)
             lower += [ends[0], ends[2]]
@@ -379,10 +379,15 @@ class CasadiBackend:
         return found
 
 
-def _status(model: Model, word: str) -> SolveStatus:
-    if model.structure.solver == "sqpmethod" and word == "Search_Direction_Becomes_Too_Small":
-        return SolveStatus.SOLVED  # the QP's step is nil: a stationary point, whose residuals decide
-    return _STATUS.get(word, SolveStatus.NUMERICAL_ERROR)
+def _status(model: Model, solution: Solution) -> SolveStatus:
+    if model.structure.solver == "ipopt":
+        return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
+    if not solution.violation <= TOLERANCE:
+        timed_out = solution.word == "User_Requested_Stop"
+        return SolveStatus.TIME_LIMIT if timed_out else SolveStatus.NUMERICAL_ERROR
+    if solution.word == "Search_Direction_Becomes_Too_Small":
+        return SolveStatus.SOLVED  # the QP's step is nil: a stationary point
+    return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
 
 
 def _require(problem: RepairProblem) -> None:

@@ -157,11 +157,14 @@ class Solution:
     word : str
         The solver's return status, or the last line of what it threw.
     iterations : int
+    violation : float
+        Largest violation of any row.
     """
 
     x: Array
     word: str
     iterations: int
+    violation: float
 
 
 class Model:
@@ -425,14 +428,14 @@ class Model:
         try:
             out = self._function(x0=x0, p=np.concatenate([data.T.ravel(), slope]), lbg=low, ubg=high)
         except RuntimeError as error:
-            return Solution(x0, _last_line(error), 0)
+            return Solution(x0, _last_line(error), 0, np.inf)
+        x, g = np.asarray(out["x"]).ravel(), np.asarray(out["g"]).ravel()
+        violation = float(np.max(np.maximum(low - g, g - high), initial=0.0))
         try:
             stats = self._function.stats()
         except RuntimeError:  # sqpmethod has no word for a QP that fails
-            return Solution(np.asarray(out["x"]).ravel(), "QP_Failed", 0)
-        return Solution(
-            np.asarray(out["x"]).ravel(), str(stats["return_status"]), int(stats.get("iter_count", 0))
-        )
+            return Solution(x, "QP_Failed", 0, violation)
+        return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
 
     def bounds(self, head: Array, lower: list[Array], upper: list[Array]) -> tuple[Array, Array]:
         """Bounds of the rows that the unknowns can move, the given points' share taken off.

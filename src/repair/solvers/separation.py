@@ -172,7 +172,8 @@ def _obstacles(
     cover, first, _ = _edges(problem, windows)
     margin, ids = problem.margin, problem.occupancy.ids
     start = problem.start[0][_AXIS] * _SIGN - first  # (N, 4)
-    deep = np.where(np.isfinite(start), start, np.inf).max(axis=1) < -_TOUCH
+    floor = min(margin, 0.0)  # a negative margin lets the curve into the box by as much
+    deep = np.where(np.isfinite(start), start, np.inf).max(axis=1) < floor - _TOUCH
     if deep.any():
         result.why = f"the ego starts inside obstacle {ids[int(np.argmax(deep))]}"
         return
@@ -193,7 +194,7 @@ def _obstacles(
     # Who starts nearer than the margin keeps the distance it has.
     from_start = np.zeros(start.shape, dtype=bool)
     from_start[np.arange(len(start)), side[:, 0]] = needed[:, 0] & np.isfinite(start[:, 0])
-    keep = np.where(from_start, np.clip(start, 0.0, margin), margin)
+    keep = np.where(from_start, np.clip(start, floor, margin), margin)
     bound = cover[n, w, :, chosen] + keep[n, chosen][:, None]
     for k in range(4):
         mine = chosen == k
@@ -213,7 +214,7 @@ def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[n
     along = _ROOM_ALONG[0] + _ROOM_ALONG[1] * max(float(problem.start[1, 0]), 0.0)
     scale = np.array([along, along, _ROOM_LATERAL, _ROOM_LATERAL])
     score = np.where(slack > 0.0, slack / scale, slack)
-    score[:, 0][np.isfinite(start) & (start < -_TOUCH)] = -np.inf
+    score[:, 0][np.isfinite(start) & (start < min(problem.margin, 0.0) - _TOUCH)] = -np.inf
     if not problem.lateral:
         score[..., 2:] = -np.inf
     return np.argmax(score, axis=2)

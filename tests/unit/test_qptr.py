@@ -1,0 +1,218 @@
+"""The QP, its corridor, its solvers, and the three different ways to have no answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from repair.baselines.corridor import NoCorridor, build_corridor
+from repair.baselines.qp import braking_problem, infeasibility, require_solver, solve_projection
+from repair.baselines.qptr import QptrBackend, make
+from repair.config import QptrConfig, load_config
+from repair.errors import BackendError, ConfigError
+from repair.passing import sides_of
+from repair.types import FrenetTrajectory, Maneuver, Passing, SolveStatus
+from tests.toy import box, constant, problem
+
+SOLVERS = ("osqp", "daqp", "clarabel")
+
+
+def guided(boxes, accelerations, *, shift=0.0, **keys):
+    """A problem whose guide changes speed at a constant rate to a stop, and moves sideways by ``shift``."""
+    base = problem(boxes, **keys)
+    t = base.t_rep + base.dt * np.arange(round((base.t_end - base.t_rep) / base.dt) + 1)
+    tau, v0 = t - base.t_rep, base.start[1, 0]
+    run = np.minimum(tau, v0 / -accelerations) if accelerations < 0 else tau
+    u = np.clip(tau / 1.5, 0.0, 1.0)
+    side = base.start[0, 1] + shift * u**3 * (10 - 15 * u + 6 * u**2)
+    position = np.column_stack([base.start[0, 0] + v0 * run + 0.5 * accelerations * run**2, side])
+    zero = np.zeros_like(position)
+    guide = FrenetTrajectory(t, position, zero, zero, zero)
+    maneuver = Maneuver.LEFT if shift else Maneuver.YIELD
+    sides = sides_of(position, *base.occupancy.at(t))
+    return problem(boxes, passing=Passing(maneuver, guide, sides, 0.0), **keys)
+
+
+def stop_before(s, **keys):
+    return guided([box((s, s + 10), (-1, 1))], -8.0, lateral=False, **keys)
+
+
+def edges(problem_, pieces=8):
+    return np.linspace(problem_.t_rep, problem_.t_end, pieces + 1)
+
+
+# -- corridor --------------------------------------------------------------------------------------
+
+
+def test_corridor_ends_before_the_box_and_holds_the_guide():
+    task = stop_before(20.0)
+    corridor = build_corridor(task, edges(task))
+    assert corridor.s_upper.max() <= 20.0 - task.margin + 1e-9
+    low, high = corridor.control_bounds(5)
+    times = np.concatenate(
+        [np.linspace(a, b, 6) for a, b in zip(edges(task)[:-1], edges(task)[1:], strict=True)]
+    )
+    guide = np.interp(times, task.passing.guide.t, task.passing.guide.position[:, 0])
+    assert np.all(guide >= low[..., 0].ravel() - 1e-6)
+    assert np.all(guide <= high[..., 0].ravel() + 1e-6)
+
+
+def test_every_trapezoid_is_below_the_free_space():
+    moving = guided([box((18, 24), (-1, 1), v=(3.0, 0.0), present=(0.7, 3.2))], -3.0, lateral=False)
+    corridor = build_corridor(moving, edges(moving))
+    lower, _ = moving.occupancy.at(moving.occupancy.t)
+    for i in range(8):
+        for t, bound in zip(moving.occupancy.t, lower[0, :, 0], strict=True):
+            if corridor.edges[i] <= t <= corridor.edges[i + 1] and np.isfinite(bound):
+                weight = (t - corridor.edges[i]) / 0.5
+                line = (1 - weight) * corridor.s_upper[i, 0] + weight * corridor.s_upper[i, 1]
+                assert line <= bound - moving.margin + 1e-5
+
+
+def test_box_beside_the_path_does_not_matter():
+    task = guided([box((5, 50), (2, 4))], 0.0, lateral=False)
+    corridor = build_corridor(task, edges(task))
+    assert corridor.s_upper.min() > 50.0
+
+
+def test_passing_on_the_left_closes_the_right():
+    task = guided([box((25, 35), (-2, 2))], 0.0, shift=3.0)
+    corridor = build_corridor(task, edges(task))
+    beside = (corridor.edges[:-1] >= 2.5) & (corridor.edges[1:] <= 3.5)
+    assert np.all(corridor.l_lower[beside] >= 2.0 + task.margin - 1e-9)
+
+
+def test_no_corridor_where_full_braking_comes_too_far():
+    # -8 m/s² takes 6.25 m to the stop, and 0.1 m are kept from the box.
+    close = stop_before(6.4)
+    build_corridor(close, edges(close))
+    closer = stop_before(6.3)
+    with pytest.raises(NoCorridor):
+        build_corridor(closer, edges(closer))
+
+
+def test_no_corridor_where_the_start_is_inside():
+    task = guided([box((-1, 5), (-1, 1))], -4.0, lateral=False)
+    with pytest.raises(NoCorridor):
+        build_corridor(task, edges(task))
+
+
+# -- backend ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_solved_within_corridor_and_limits(solver):
+    task = stop_before(20.0)
+    answer = QptrBackend(QptrConfig(solver=solver)).solve(task)
+    assert answer.status is SolveStatus.SOLVED
+    assert max(answer.residuals.values()) < 1e-3
+    samples = answer.curve.sample(np.linspace(0.0, 4.0, 200))
+    assert samples.position[:, 0].max() <= 20.0 - task.margin + 1e-3
+    assert samples.velocity[:, 0].min() >= -1e-4
+    assert samples.acceleration[:, 0].min() >= task.limits.a_min - 1e-3
+    begin = answer.curve.sample([0.0])
+    np.testing.assert_allclose(
+        [begin.position[0], begin.velocity[0], begin.acceleration[0]], task.start, atol=1e-6
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_no_corridor_and_no_solution_are_two_answers(solver):
+    backend = QptrBackend(QptrConfig(solver=solver))
+    closed = backend.solve(stop_before(6.0))
+    assert closed.status is SolveStatus.NO_CORRIDOR
+    assert closed.curve is None
+    # Full braking at once would do; with limited jerk the polynomial cannot.
+    impossible = backend.solve(stop_before(6.6))
+    assert impossible.status is SolveStatus.INFEASIBLE
+    assert impossible.curve is None
+    assert "no common point" in impossible.detail
+
+
+def test_solvers_agree_on_verdict_and_objective():
+    backends = [QptrBackend(QptrConfig(solver=s)) for s in SOLVERS]
+    for s in (6.0, 6.6, 8.0, 10.0, 12.0, 16.0, 25.0, 60.0):
+        answers = [b.solve(stop_before(s)) for b in backends]
+        assert len({a.status for a in answers}) == 1, (s, [a.detail for a in answers])
+        objectives = [a.objective for a in answers if a.curve is not None]
+        assert np.ptp(objectives) <= 1e-3 * (1.0 + min(objectives, default=0.0)) if objectives else True
+
+
+def test_swerves_and_ends_parallel_to_the_path():
+    task = guided([box((25, 35), (-2, 2))], 0.0, shift=3.0)
+    answer = QptrBackend(QptrConfig(solver="daqp")).solve(task)
+    assert answer.status is SolveStatus.SOLVED
+    beside = answer.curve.sample(np.linspace(2.6, 3.4, 40))
+    assert beside.position[:, 1].min() >= 2.0 + task.margin - 1e-4
+    end = answer.curve.sample([answer.curve.t_end])
+    np.testing.assert_allclose(end.velocity[0, 1], 0.0, atol=1e-6)
+
+
+def test_follows_the_reference_where_nothing_is_in_the_way():
+    answer = QptrBackend(QptrConfig(solver="daqp")).solve(problem([], lateral=False))
+    t = np.linspace(0.0, 4.0, 30)
+    np.testing.assert_allclose(answer.curve.sample(t).position, constant().sample(t).position, atol=1e-6)
+    assert answer.objective == pytest.approx(0.0, abs=1e-9)
+
+
+def test_no_time_left_is_a_status():
+    answer = QptrBackend(QptrConfig(solver="osqp")).solve(stop_before(20.0), time_limit=0.0)
+    assert answer.status is SolveStatus.TIME_LIMIT
+
+
+def test_problem_without_duration_is_malformed():
+    with pytest.raises(BackendError, match="no duration"):
+        QptrBackend(QptrConfig(solver="daqp")).solve(problem([], t_rep=4.0, t_end=4.0))
+
+
+# -- solvers ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_offered_solvers_are_not_refused(solver):
+    require_solver(solver)
+
+
+def test_unknown_solver_names_those_there_are():
+    with pytest.raises(BackendError, match=r"nosuch.*daqp"):
+        QptrBackend(QptrConfig(solver="nosuch"))
+
+
+def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
+    from repair.baselines import qp
+
+    class Broken:
+        found, x, z, extras = True, np.zeros(18), np.zeros(1000), {}
+
+    monkeypatch.setattr(qp, "_call", lambda *_: Broken())
+    qp._objection.cache_clear()
+    with pytest.raises(BackendError, match=r"'daqp' is refused: .*braking problem"):
+        require_solver("daqp")
+    qp._objection.cache_clear()
+
+
+def test_answer_is_judged_by_its_residuals_not_by_its_name(monkeypatch):
+    from repair.baselines import qp
+
+    origin, rows, limit = braking_problem(14.75)
+
+    class Claims:
+        found, x, z, extras = True, np.full(18, 1e3), np.zeros(len(rows)), {}
+
+    monkeypatch.setattr(qp, "_call", lambda *_: Claims())
+    answer = solve_projection(origin, rows, limit, "daqp")
+    assert answer.z is None
+    assert answer.status is SolveStatus.NUMERICAL_ERROR
+
+
+def test_shortest_stop_of_the_braking_problem():
+    assert infeasibility(*braking_problem(13.80)[1:]) == pytest.approx(0.0, abs=1e-9)
+    assert infeasibility(*braking_problem(13.70)[1:]) > 1e-3
+
+
+def test_configuration():
+    config = load_config(backend="qptr", overrides=["qptr.solver=daqp", "qptr.continuity=3"])
+    assert make(config).config.continuity == 3
+    with pytest.raises(ConfigError, match=r"qptr\.continuity"):
+        load_config(overrides=["qptr.continuity=7"])
+    with pytest.raises(BackendError, match="continuity"):
+        QptrBackend(QptrConfig(degree=3, continuity=3))
