@@ -138,4 +138,3 @@ def chosen_problem(made: Case, t_rep: float = 0.0) -> Any:
         if solved.curve is not None and made.prepared.checker.check(problem, solved.curve).ok:
             return problem
     return problems[0]
-

@@ -54,4 +54,6 @@ def _blas() -> list[str]:
         from threadpoolctl import threadpool_info
     except ImportError:
         return [f"OPENBLAS_NUM_THREADS={os.environ.get('OPENBLAS_NUM_THREADS')}"]
-    return [f"{i['internal_api']} {i.get('version')}, {i['num_threads']} thread(s)" for i in threadpool_info()]
+    return [
+        f"{i['internal_api']} {i.get('version')}, {i['num_threads']} thread(s)" for i in threadpool_info()
+    ]

@@ -155,7 +155,13 @@ def ratio(slow: Times, fast: Times) -> Spread:
 
 
 def row(
-    group: str, name: str, times: Times, against: Times | None = None, label: str = "", note: str = "", unit: str = "ms"
+    group: str,
+    name: str,
+    times: Times,
+    against: Times | None = None,
+    label: str = "",
+    note: str = "",
+    unit: str = "ms",
 ) -> Row:
     """A row of times, in milliseconds unless ``unit`` says microseconds."""
     factor = {"ms": 1e3, "us": 1e6, "s": 1.0}[unit]
@@ -166,4 +172,6 @@ def row(
 
 def exponent(x: Any, y: Any) -> float:
     """Slope of log y over log x."""
-    return float(np.polyfit(np.log(np.asarray(x, dtype=np.float64)), np.log(np.asarray(y, dtype=np.float64)), 1)[0])
+    return float(
+        np.polyfit(np.log(np.asarray(x, dtype=np.float64)), np.log(np.asarray(y, dtype=np.float64)), 1)[0]
+    )

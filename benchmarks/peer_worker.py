@@ -1,7 +1,8 @@
-"""Runs inside a peer's interpreter: ``python peer_worker.py JOB.json``, where neither ``repair`` nor ``benchmarks`` is.
+"""Runs inside a peer's interpreter, which knows nothing of us: ``python peer_worker.py JOB.json``.
 
-The job names the scenario's file, the measure, and carries the path that ``repair`` drives along, so that all
-plan on the same road: ``{"scenario", "measure", "rounds", "path": [[x, y], ...], "ego": [[x, y, heading, v], ...]}``.
+The job names the scenario's file and the measure, and carries the path that ``repair`` drives along, so
+that all plan on the same road:
+``{"scenario", "measure", "rounds", "path": [[x, y], ...], "ego": [[x, y, heading, v], ...]}``.
 The answer is one line of JSON, the last one on standard output.
 """
 
@@ -45,11 +46,18 @@ def crime_ttr(job):
     scenario, _ = CommonRoadFileReader(job["scenario"]).open()
     x, y, heading, speed = job["ego"][0]
     first = InitialState(
-        time_step=0, position=np.array([x, y]), orientation=heading, velocity=speed,
-        acceleration=0.0, yaw_rate=0.0, slip_angle=0.0,
+        time_step=0,
+        position=np.array([x, y]),
+        orientation=heading,
+        velocity=speed,
+        acceleration=0.0,
+        yaw_rate=0.0,
+        slip_angle=0.0,
     )
     states = [
-        CustomState(time_step=k, position=np.array(row[:2]), orientation=row[2], velocity=row[3], acceleration=0.0)
+        CustomState(
+            time_step=k, position=np.array(row[:2]), orientation=row[2], velocity=row[3], acceleration=0.0
+        )
         for k, row in enumerate(job["ego"][1:], start=1)
     ]
     shape, name = Rectangle(length=4.298, width=1.674), 99999
@@ -67,7 +75,7 @@ def crime_ttr(job):
     measure = built[2]
     timed(lambda: measure.compute(time_step=0, verbose=False), 1)
     cpu, wall, value = timed(lambda: measure.compute(time_step=0, verbose=False), job["rounds"])
-    return cpu, wall, "TTR %s s, built in %.0f ms" % (value, 1e3 * built[0][0])
+    return cpu, wall, f"TTR {value} s, built in {1e3 * built[0][0]:.0f} ms"
 
 
 def reactive_planner(job):
@@ -86,12 +94,17 @@ def reactive_planner(job):
     config.debug.logging_level = "CRITICAL"
     config.update(scenario=scenario, planning_problem=problem)
     planner = ReactivePlanner(config)
-    planner.set_reference_path(coordinate_system=CoordinateSystem(np.array(job["path"]), clcs_params=CLCSParams()))
+    planner.set_reference_path(
+        coordinate_system=CoordinateSystem(np.array(job["path"]), clcs_params=CLCSParams())
+    )
     start = planner.x_0  # made of the problem's initial state by the constructor
 
     def replan():
-        planner.reset(initial_state_cart=start, collision_checker=planner.collision_checker,
-                      coordinate_system=planner.coordinate_system)
+        planner.reset(
+            initial_state_cart=start,
+            collision_checker=planner.collision_checker,
+            coordinate_system=planner.coordinate_system,
+        )
         planner.set_desired_velocity(problem.initial_state.velocity, problem.initial_state.velocity)
         return planner.plan()
 
@@ -111,7 +124,7 @@ def main(path):
 
         answer = {"cpu": cpu, "wall": wall, "note": note, "version": version(distribution[job["measure"]])}
     except Exception as error:  # whatever a peer breaks on is the answer, not our crash
-        answer = {"error": "%s: %s" % (type(error).__name__, " ".join(str(error).split())[:300])}
+        answer = {"error": f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"}
     print("\n" + json.dumps(answer))
 
 

@@ -118,7 +118,9 @@ class Stopwatch:
                 setattr(owner, name, original)
 
 
-def _shares(call: Callable[[], Any], targets: dict[str, str], rounds: int) -> tuple[dict[str, list[float]], list[float]]:
+def _shares(
+    call: Callable[[], Any], targets: dict[str, str], rounds: int
+) -> tuple[dict[str, list[float]], list[float]]:
     """Own time of every phase per call, round by round [s], and the whole."""
     watch, parts, whole = Stopwatch(targets), {name: [] for name in targets}, []
     call()
@@ -137,7 +139,7 @@ def _shares(call: Callable[[], Any], targets: dict[str, str], rounds: int) -> tu
 def shares(context: Context, number: int, backend: str) -> Report:
     """Phases of one backend's whole search."""
     made = case(context.path(number), number, backend)
-    kind = backend.split()[0]
+    kind = backend.split(maxsplit=1)[0]
     targets = {**SOLVING[kind], **CHECKS}
     parts, whole = _shares(made.search, targets, context.rounds(41, 9))
     label, run, _ = case(context.path(number), number, "ego").baseline()
@@ -157,8 +159,12 @@ def shares(context: Context, number: int, backend: str) -> Report:
         slow = Spread.of(slow_parts[own]).median if own else 0.0
         compared = Spread.of((slow or base) / np.maximum(spent, 1e-9))
         against = "literal, same phase" if slow else label
-        report.rows.append(Row(group, name, "ms", cpu, None, compared, against, f"{100 * cpu.median / total.median:.0f} %"))
-    report.rows.append(Row(group, "whole, with the stopwatch", "ms", total, None, Spread.of(base / np.asarray(whole)), label))
+        report.rows.append(
+            Row(group, name, "ms", cpu, None, compared, against, f"{100 * cpu.median / total.median:.0f} %")
+        )
+    report.rows.append(
+        Row(group, "whole, with the stopwatch", "ms", total, None, Spread.of(base / np.asarray(whole)), label)
+    )
     if kind == "ego":
         solving = sum(np.asarray(parts[name]) for name in ("deformation", "refinement") if name in parts)
         slow = Spread.of(slow_parts["optimisation"]).median
@@ -218,7 +224,9 @@ def parts(context: Context, number: int) -> Report:
         "literal sampling": lambda: slow_curve.sample(times),
         f"sampling at {len(times)} times": lambda: curve.sample(times),
         "literal collision": lambda: literal.first_collision(problem, slow_curve),
-        "collision check of true rectangles": lambda: checker.world.contact(states.x, states.y, states.orientation),
+        "collision check of true rectangles": lambda: checker.world.contact(
+            states.x, states.y, states.orientation
+        ),
         f"kinematic check, direct, {transitions} transitions": lambda: direct_check(coarse, dt, vehicle),
         "whole check": lambda: checker.check(problem, curve),
     }
@@ -229,7 +237,9 @@ def parts(context: Context, number: int) -> Report:
         "collision check of true rectangles": "literal collision",
     }
     measured = together(calls, context.rounds(21, 5))
-    official = together({"": lambda: official_check(coarse, dt, vehicle)}, context.rounds(3, 1), warm_up=0)[""]
+    official = together({"": lambda: official_check(coarse, dt, vehicle)}, context.rounds(3, 1), warm_up=0)[
+        ""
+    ]
     slow = Spread.of(official.cpu).median
     group = f"single calls at t_rep 0: {context.title(number)}"
     report = Report()
@@ -256,8 +266,13 @@ def nlp_build(context: Context, number: int) -> Report:
         structure = made.backend._structure(problem, timed=False)
         build = casadi_nlp.build_model
         fresh = getattr(build, "__wrapped__", build)
-        calls = {"first": lambda fresh=fresh, s=structure: fresh(s), "again": lambda b=build, s=structure: b(s)}
+        calls = {
+            "first": lambda fresh=fresh, s=structure: fresh(s),
+            "again": lambda b=build, s=structure: b(s),
+        }
         times = together(calls, context.rounds(9, 3), warm_up=1)
         report.rows.append(row(group, f"{backend}, first time", times["first"]))
-        report.rows.append(row(group, f"{backend}, from the cache", times["again"], times["first"], "first time"))
+        report.rows.append(
+            row(group, f"{backend}, from the cache", times["again"], times["first"], "first time")
+        )
     return report

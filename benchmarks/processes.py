@@ -36,7 +36,10 @@ def child(code: str, *arguments: str) -> Any:
 def _process(*arguments: str) -> Any:
     def run() -> None:
         subprocess.run(
-            [sys.executable, "-W", "ignore", *arguments], env=environment(), stdout=subprocess.DEVNULL, check=True
+            [sys.executable, "-W", "ignore", *arguments],
+            env=environment(),
+            stdout=subprocess.DEVNULL,
+            check=True,
         )
 
     return run
@@ -49,7 +52,10 @@ def imports(context: Context) -> Report:
         "import numpy": ("-c", "import numpy"),
         "import repair": ("-c", "import repair"),
         "import numpy, repair": ("-c", "import numpy, repair"),
-        "import repair; repair.load_scene, repair.repair": ("-c", "import repair; repair.load_scene, repair.repair"),
+        "import repair; repair.load_scene, repair.repair": (
+            "-c",
+            "import repair; repair.load_scene, repair.repair",
+        ),
         "repair --help": ("-m", "repair", "--help"),
         "repair presets": ("-m", "repair", "presets"),
     }
@@ -69,7 +75,12 @@ def imports(context: Context) -> Report:
         f"print(json.dumps([m for m in {HEAVY!r} if m in sys.modules]))"
     )
     report.targets.append(
-        Target("import repair and repair --help load", "none of " + ", ".join(HEAVY), ", ".join(loaded) or "none", not loaded)
+        Target(
+            "import repair and repair --help load",
+            "none of " + ", ".join(HEAVY),
+            ", ".join(loaded) or "none",
+            not loaded,
+        )
     )
     return report
 
@@ -99,8 +110,8 @@ def peak():
         with open("/proc/self/status") as file:
             return int(re.search(r"VmHWM:\\s+(\\d+)", file.read()).group(1)) / 1024.0
     except (OSError, AttributeError):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024.0 if sys.platform == "linux" else 2.0**20)
-bare = peak()
+        unit = 1024.0 if sys.platform == "linux" else 2.0**20
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 import numpy
 numpy_only = peak()
 from repair.api import prepare, search
@@ -114,8 +125,10 @@ imported = peak()
 scene = load_scene(sys.argv[1])
 loaded = peak()
 result = search(prepare(scene, config), backend)
-print(json.dumps({"bare": bare, "numpy": numpy_only, "imported": imported, "loaded": loaded, "searched": peak(),
-                  "status": result.status.value, "plans": len(result.search.probes), "obstacles": len(scene.obstacles)}))
+print(json.dumps({
+    "numpy": numpy_only, "imported": imported, "loaded": loaded, "searched": peak(),
+    "status": result.status.value, "plans": len(result.search.probes), "obstacles": len(scene.obstacles),
+}))
 """
 
 
@@ -135,7 +148,8 @@ def memory(context: Context) -> Report:
             continue
         highest = max(highest, found["searched"])
         note = (
-            f"numpy {found['numpy']:.0f}, all imports {found['imported']:.0f}, scene loaded {found['loaded']:.0f}; "
+            f"numpy {found['numpy']:.0f}, all imports {found['imported']:.0f}, "
+            f"scene loaded {found['loaded']:.0f}; "
             f"{found['status']}, {found['plans']} plans, {found['obstacles']} obstacles"
         )
         report.rows.append(Row(group, label, "MB", Spread.of([found["searched"]]), note=note))
@@ -160,10 +174,14 @@ def peers(context: Context) -> Report:
     frame, speed, dt = p.scene.frame, float(p.scene.start[1, 0]), p.scene.dt
     s = p.scene.start[0, 0] + speed * dt * np.arange(p.scene.n_steps + 1)
     heading = np.interp(s, frame.s, frame.heading_table)
-    ego = np.column_stack([*(np.interp(s, frame.s, frame.points[:, k]) for k in (0, 1)), heading, np.full(len(s), speed)])
+    ego = np.column_stack(
+        [*(np.interp(s, frame.s, frame.points[:, k]) for k in (0, 1)), heading, np.full(len(s), speed)]
+    )
     ours = together({"ego": made.search, "literal": made.literal}, context.rounds(9, 3))
     slow = Spread.of(ours["literal"].cpu).median
-    report.rows.append(row(group, "repair: whole search, ego", ours["ego"], ours["literal"], "literal search"))
+    report.rows.append(
+        row(group, "repair: whole search, ego", ours["ego"], ours["literal"], "literal search")
+    )
     whole = Spread.of(ours["ego"].cpu).median
     labels = {"crime": "CommonRoad-CriMe: TTR", "reactive-planner": "commonroad-reactive-planner: one replan"}
     for measure, label in labels.items():
@@ -177,7 +195,9 @@ def peers(context: Context) -> Report:
             continue
         found = Times(tuple(answer["cpu"]), tuple(answer["wall"]))
         against = Times((slow,) * len(found.cpu), (slow,) * len(found.cpu))
-        note = f"{answer['version']}; {answer['note']}; {Spread.of(found.cpu).median / whole:.0f} x our search"
+        note = (
+            f"{answer['version']}; {answer['note']}; {Spread.of(found.cpu).median / whole:.0f} x our search"
+        )
         report.rows.append(row(group, label, found, against, "literal search", note))
     return report
 
@@ -190,7 +210,13 @@ def _peer(python: str, file: Path, job: dict[str, Any]) -> dict[str, Any]:
     try:
         # its own folder: some peers write into the working directory
         done = subprocess.run(
-            [python, str(worker), str(file)], capture_output=True, text=True, timeout=300, cwd=file.parent, env=clean
+            [python, str(worker), str(file)],
+            capture_output=True,
+            text=True,
+            timeout=300,
+            cwd=file.parent,
+            env=clean,
+            check=False,
         )
         return dict(json.loads(done.stdout.strip().splitlines()[-1]))
     except subprocess.TimeoutExpired:

@@ -80,9 +80,16 @@ def _standing(template: Obstacle, number: int, centre: np.ndarray, heading: floa
         return array
 
     return replace(
-        template, id=900_000 + number, kind="parkedVehicle", role="static", vertices=always(outline),
-        rectangles=always([*centre, heading, *half]), circles=None, polygons=(), states=always([*centre, heading, 0.0]),
-    )  # fmt: skip
+        template,
+        id=900_000 + number,
+        kind="parkedVehicle",
+        role="static",
+        vertices=always(outline),
+        rectangles=always([*centre, heading, *half]),
+        circles=None,
+        polygons=(),
+        states=always([*centre, heading, 0.0]),
+    )
 
 
 def _parked(scene: Any, count: int, near: bool) -> tuple[Obstacle, ...]:
@@ -122,11 +129,12 @@ def obstacles(context: Context, near: bool) -> Report:
         medians = [Spread.of(found[f"{n}"].cpu).median for n in counts]
         total = [n + len(scene.obstacles) for n in counts]
         power, growth = exponent(total, medians), medians[-1] / medians[0]
-        report.remarks.append(f"{group}: {label} ~ obstacles^{power:.2f}; {counts[0]} to {counts[-1]}: {growth:.2f} x")
+        report.remarks.append(
+            f"{group}: {label} ~ obstacles^{power:.2f}; {counts[0]} to {counts[-1]}: {growth:.2f} x"
+        )
         if not near:
-            report.targets.append(Target(
-                f"{label} with obstacles out of reach", "exponent < 1 (sublinear)", f"{power:.2f}", power < 1.0
-            ))  # fmt: skip
+            name = f"{label} with obstacles out of reach"
+            report.targets.append(Target(name, "exponent < 1 (sublinear)", f"{power:.2f}", power < 1.0))
     return report
 
 
@@ -150,4 +158,3 @@ def horizon(context: Context, backend: str) -> Report:
         ))  # fmt: skip
     report.remarks.append(f"{group}: time per plan ~ horizon^{exponent(list(made), plans):.2f}")
     return report
-

@@ -10,7 +10,9 @@ from benchmarks.measure import Report, Row, Spread
 def number(x: float) -> str:
     """Three significant digits without an exponent."""
     size = abs(x)
-    return f"{x:.0f}" if size >= 100 else f"{x:.1f}" if size >= 10 else f"{x:.2f}" if size >= 0.1 else f"{x:.3f}"
+    return (
+        f"{x:.0f}" if size >= 100 else f"{x:.1f}" if size >= 10 else f"{x:.2f}" if size >= 0.1 else f"{x:.3f}"
+    )
 
 
 def _range(spread: Spread) -> str:
@@ -22,7 +24,18 @@ def _line(r: Row) -> list[str]:
     wall = number(r.wall.median) if r.wall else ""
     ratio = f"{number(r.ratio.median)} x" if r.ratio else ""
     spread = _range(r.ratio) if r.ratio else ""
-    return [r.name, number(r.cpu.median), r.unit, _range(r.cpu), extremes, wall, ratio, spread, r.against, r.note]
+    return [
+        r.name,
+        number(r.cpu.median),
+        r.unit,
+        _range(r.cpu),
+        extremes,
+        wall,
+        ratio,
+        spread,
+        r.against,
+        r.note,
+    ]
 
 
 HEAD = ["", "median", "", "IQR", "min-max", "wall", "ratio", "IQR", "against", ""]
@@ -41,7 +54,9 @@ def aligned(lines: list[list[str]]) -> list[str]:
 
 def print_report(report: Report, machine: dict[str, Any]) -> None:
     """All groups, then what was asked for and whether it holds."""
-    loads = ["/".join(f"{x:.1f}" for x in machine.get(k) or ()) for k in ("load_average", "load_average_after")]
+    loads = [
+        "/".join(f"{x:.1f}" for x in machine.get(k) or ()) for k in ("load_average", "load_average_after")
+    ]
     print(f"{machine['processor']}, {machine['cores']} core(s), load {loads[0]} before, {loads[1]} after")
     print(f"Python {machine['python']}, " + ", ".join(f"{k} {v}" for k, v in machine["versions"].items()))
     print("BLAS: " + "; ".join(machine["blas"]))

@@ -16,6 +16,7 @@ from repair.collision import CollisionWorld, Contact, RoadBoundary, official_shi
 from repair.config import CheckerConfig
 from repair.kinematics import DrivenStates, direct_check, drive, official_check
 from repair.metrics import Peaks, peaks
+from repair.occupancy import first_entry
 from repair.types import (
     Array,
     Curve,
@@ -138,6 +139,8 @@ class Checker:
             return _NOT_FINITE
         states = self._drive(path, self._slip(problem.reference, problem.t_end, first_sample))
         found = self._limits(path, problem.t_rep) if self.config.limits else []
+        if self.config.margin:
+            found += self._margin(problem, curve)
         found += self._clear(states, first_sample)
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(states)))
@@ -175,6 +178,15 @@ class Checker:
             if index is not None:
                 found.append(Violation(Reason.OFF_ROAD, float(states.t[index]), "the ego leaves the road"))
         return found
+
+    def _margin(self, problem: RepairProblem, curve: Curve) -> list[Violation]:
+        """The paper's detectCollision on the repaired part, at the scenario's steps."""
+        samples = self.times(problem.t_end)[:: self.config.substeps]
+        entry = first_entry(problem.occupancy, curve.sample(samples[samples >= problem.t_rep - 1e-9]))
+        if entry is None:
+            return []
+        time = float(samples[samples >= problem.t_rep - 1e-9][entry[0]])
+        return [Violation(Reason.MARGIN, time, f"obstacle {problem.occupancy.ids[entry[1]]}")]
 
     def _limits(self, path: CartesianPath, t_rep: float) -> list[Violation]:
         limits, late = self.limits, path.t >= t_rep - 1e-9

@@ -175,8 +175,9 @@ class CheckerConfig:
 
     substeps: int = 4  # samples per scenario step between which nothing is looked at
     official: str = "leftover"  # leftover | always | never
-    road: bool = True
-    limits: bool = True
+    road: bool = True  # the ego's rectangle stays on the road
+    limits: bool = True  # the repaired part keeps the limits
+    margin: bool = False  # the repaired part stays out of the inflated boxes, as the TTC asks of the reference
 
 
 @dataclass
@@ -376,8 +377,8 @@ def _read_yaml(path: Path) -> Any:
     except FileNotFoundError as error:
         raise ConfigError(f"configuration file {path} does not exist") from error
     except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ConfigError(f"configuration file {path} cannot be read: {first}") from error
+        cause = " ".join(str(error).split())[:200] or type(error).__name__
+        raise ConfigError(f"configuration file {path} cannot be read: {cause}") from error
     if not isinstance(layer, DictConfig):
         raise ConfigError(f"configuration file {path} must hold a mapping of keys")
     return layer

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from repair.bspline import UniformBSpline, basis_matrix, fit_to_curve, n_points_for, splice_points
+from repair.bspline import UniformBSpline, basis_matrix, derivative_matrix, n_points_for, splice_points
 from repair.config import ReferenceConfig
 from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError
 from repair.types import Array, Curve, FrenetTrajectory, Occupancy, frozen
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from repair.scene.commonroad import Scene
 
 _GRID_MAX = 2e8  # edges that the graph search may look at: a few seconds
+_JERK = 0.3  # weight of the jerk (m/s³) against the distance (m) to the searched profile
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
 __all__ = ["SpeedProfile", "known_until", "make_reference", "plan_speed", "recorded_positions"]
@@ -276,21 +277,22 @@ def _search(
 
 
 def _smooth(profile: SpeedProfile, scene: Scene, duration: float) -> UniformBSpline:
-    """C2 spline through the profile, starting with the ego's own acceleration."""
-    spacing, degree = 0.5, 3
+    """C2 spline near the profile, starting in the ego's own state; jerk is weighed against distance.
+
+    The profile's acceleration jumps at every layer. A spline that followed it closely would swing
+    around the jumps.
+    """
+    degree, spacing = 3, 0.5
     n = n_points_for(duration, spacing, degree)
-
-    class _Start:
-        t_start, t_end = 0.0, duration
-
-        @staticmethod
-        def sample(t: npt.ArrayLike) -> FrenetTrajectory:
-            points = profile.sample(t)
-            acceleration = points.acceleration.copy()
-            acceleration[0] = scene.start[2]
-            return FrenetTrajectory(points.t, points.position, points.velocity, acceleration, points.jerk)
-
-    return fit_to_curve(_Start(), 0.0, n, degree, spacing)
+    tau = np.arange((n - degree) * 5 + 1) * (spacing / 5)
+    head = splice_points(scene.start, degree, spacing)
+    head[:, 1] = 0.0
+    left = np.vstack([basis_matrix(tau, n, degree, spacing), _JERK * derivative_matrix(n, 3, spacing)])
+    right = np.concatenate([profile.sample(tau).position[:, 0], np.zeros(n - 3)]) - left[:, :degree] @ head[:, 0]
+    tail = np.linalg.lstsq(left[:, degree:], right, rcond=None)[0]
+    points = np.zeros((n, 2))
+    points[:, 0] = np.concatenate([head[:, 0], tail])
+    return UniformBSpline(0.0, spacing, degree, frozen(points))
 
 
 # -- recorded --------------------------------------------------------------------------------------
@@ -317,15 +319,17 @@ def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
         raise ReferenceTrajectoryError("reference.source is file, but reference.file names no solution file")
     from commonroad.common.solution import CommonRoadSolutionReader
 
+    from repair.scene.reading import read_xml
+
     path = Path(file)
-    if not path.is_file():
-        raise ReferenceTrajectoryError(f"solution file {path} does not exist")
     try:
-        solution = CommonRoadSolutionReader.open(str(path))
-    except Exception as error:
+        solution = CommonRoadSolutionReader.fromstring(read_xml(path)[0])
+    except ScenarioError as error:
+        raise ReferenceTrajectoryError(f"solution file {error}") from error
+    except Exception as error:  # commonroad-io raises whatever the broken part happens to cause
         first = (str(error).splitlines() or [""])[0]
         raise ReferenceTrajectoryError(f"{path} is not a CommonRoad solution file: {type(error).__name__} {first}") from error
-    if str(solution.scenario_id) != scene.id:
+    if str(solution.scenario_id) not in (scene.id, str(scene.scenario.scenario_id)):
         raise ReferenceTrajectoryError(f"{path} is a solution for {solution.scenario_id}, not for {scene.id}")
     matching = [s for s in solution.planning_problem_solutions if s.planning_problem_id == scene.planning_problem_id]
     if not matching:

@@ -251,7 +251,7 @@ def search_f_ttr(
     if conflict.time == float("inf"):
         return SearchResult(SearchStatus.NO_CONFLICT, conflict, float("inf"), None)
     if conflict.contact_time <= 0.0:
-        return SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, 0.0, None)
+        return SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, None, None)
     # A conflict at t = 0 without contact leaves t_rep = 0 as the only candidate.
     end = max(conflict.time, settings.delta_t * 1e-3)
     if settings.upper is not None:

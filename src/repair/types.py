@@ -375,6 +375,7 @@ class Reason(str, Enum):
     OFF_ROAD = "off_road"
     KINEMATICS = "kinematics"
     LIMITS = "limits"
+    MARGIN = "margin"
     CHECKER_ERROR = "checker_error"
     NOT_SOLVED = "not_solved"
     NO_CORRIDOR = "no_corridor"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.toy import constant
+
 from repair.api import prepare
 from repair.baselines.at_ttr import problems_at_ttr, repair_at_ttr
 from repair.baselines.evasive import EvasiveManeuver, EvasiveStatus, evasive_ttr, maneuvers_at
@@ -13,7 +15,6 @@ from repair.scene.synthetic import RoadDamage, scenario_1, scenario_2
 from repair.scene.vehicle import load_vehicle
 from repair.solvers.registry import make_backend
 from repair.types import Curve, SearchStatus
-from tests.toy import constant
 
 VEHICLE = load_vehicle(1)
 BRAKE, KICK, LEFT, RIGHT = EvasiveManeuver

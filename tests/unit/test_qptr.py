@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.toy import box, constant, problem
+
 from repair.baselines.corridor import NoCorridor, build_corridor
 from repair.baselines.qp import braking_problem, infeasibility, require_solver, solve_projection
 from repair.baselines.qptr import QptrBackend, make
@@ -11,7 +13,6 @@ from repair.config import QptrConfig, load_config
 from repair.errors import BackendError, ConfigError
 from repair.passing import sides_of
 from repair.types import FrenetTrajectory, Maneuver, Passing, SolveStatus
-from tests.toy import box, constant, problem
 
 SOLVERS = ("osqp", "daqp", "clarabel")
 

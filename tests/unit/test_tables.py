@@ -6,6 +6,7 @@ import json
 import re
 
 import pytest
+
 from repair.errors import ConfigError
 from repair.report.grid import DASH, Section, Table, against, decimal
 from repair.report.tables import METHODS, machine, table1, table2

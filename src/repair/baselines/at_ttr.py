@@ -92,7 +92,7 @@ def repair_at_ttr(
     if evasive.ttr == float("inf"):
         return AtTtrResult(evasive, SearchResult(SearchStatus.NO_CONFLICT, conflict, float("inf"), None))
     if conflict.contact_time <= 0.0:
-        return AtTtrResult(evasive, SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, 0.0, None))
+        return AtTtrResult(evasive, SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, None, None))
     best: Probe | None = None
     tried: list[str] = []
     for problem in problems_at_ttr(prepared, evasive):

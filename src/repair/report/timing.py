@@ -119,7 +119,9 @@ def table2(
         for name in backends:
             row, prepared = _timed(name, number, scene, runs, overrides, bar.update)
             if name == "ego" and literal is not None and prepared is not None:
-                slow = [seconds / max(n, 1) for seconds, n in (literal(prepared) for _ in range(literal_runs))]
+                slow = [
+                    seconds / max(n, 1) for seconds, n in (literal(prepared) for _ in range(literal_runs))
+                ]
                 row["literal_iteration_s"] = _spread(slow)
                 row["literal_ratio"] = round(float(np.mean(slow)) / row["iteration_s"]["mean"], 3)
             rows.append(row)

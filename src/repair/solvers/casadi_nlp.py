@@ -39,6 +39,7 @@ _TIGHTEN = 1e-7  # bounds are taken in by this much, so that the solver's own to
 _INF = np.inf
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
 _SIDES = 4  # sets of sides that are tried
+_FRICTION = 0.995  # share of the friction circle used at the samples, for what happens in between
 _EDGE = 0.05  # [m] kept from the edge of the road
 _OWN = 0.05  # [m] by which the body's ends may always leave the axis' own
 _ROAD_SLACK = 0.5  # [m] of s either way of the guide over which the road must be wide enough
@@ -200,7 +201,7 @@ class CasadiBackend:
             lower.append(np.full(len(rows.matrix), low.get(key, -_INF)))
             upper.append(np.full(len(rows.matrix), high.get(key, _INF)))
         count = len(model.tau)
-        total = limits.a_total**2
+        total = (_FRICTION * limits.a_total) ** 2
         across = limits.a_lat if limits.a_lat < limits.a_total - 1e-9 else _INF
         lower += [np.full(count, -_INF), np.full(count, -across)]
         upper += [np.full(count, total), np.full(count, across)]
