@@ -24,7 +24,7 @@ RATIOS = Path(__file__).with_name("ratios.json")
 BACKENDS = ("ego", "qptr", "casadi sqpmethod")
 MARGIN = 0.4  # share of the recorded ratio that may be lost: interpreters and BLAS differ by half of that
 ATTEMPTS = 3
-ROUNDS = 9
+ROUNDS = 7
 
 
 class Searches:
@@ -42,7 +42,7 @@ class Searches:
         from benchmarks.measure import ratio, together
 
         calls = {"literal": self.made["ego"].literal, **{name: c.search for name, c in self.made.items()}}
-        times = together(calls, rounds, shortest=0.05)
+        times = together(calls, rounds, shortest=0.03)
         return {name: ratio(times["literal"], times[name]).median for name in self.made}
 
 

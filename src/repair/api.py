@@ -182,6 +182,8 @@ class RepairResult:
         Extremes of the repaired part; None without a repair.
     phases : dict
         Wall time by phase [s].
+    ttr : float or None
+        TTR by fixed evasive manoeuvres [s] with ``driver: at_ttr`` (-inf: none helps); else None.
     """
 
     prepared: Prepared
@@ -189,6 +191,7 @@ class RepairResult:
     states: DrivenStates
     peaks: Peaks | None
     phases: dict[str, float]
+    ttr: float | None = None
 
     @property
     def status(self) -> SearchStatus:
@@ -281,13 +284,21 @@ def repair(
 
 
 def search(prepared: Prepared, backend: Any, *, on_probe: Any = None, phases: dict[str, float] | None = None) -> RepairResult:
-    """Algorithm 1 on something prepared."""
+    """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, one repair at the TTR)."""
     timed = _Phases(dict(phases or {}))
     timed.seconds.update(prepared.phases)
+    ttr: float | None = None
     with timed("search"):
-        found = search_f_ttr(
-            prepared.source, prepared.conflict, backend, prepared.checker, prepared.config.search, on_probe=on_probe
-        )
+        if prepared.config.driver == "at_ttr":
+            from repair.baselines.at_ttr import repair_at_ttr
+
+            answer = repair_at_ttr(prepared, backend, on_probe=on_probe)
+            found, ttr = answer.search, answer.ttr
+        else:
+            found = search_f_ttr(
+                prepared.source, prepared.conflict, backend, prepared.checker, prepared.config.search,
+                on_probe=on_probe,
+            )  # fmt: skip
     timed.seconds["solve"] = sum(p.solve.solve_time for p in found.probes)
     timed.seconds["build"] = sum(p.solve.build_time for p in found.probes)
     timed.seconds["check"] = sum(p.check_time for p in found.probes)
@@ -297,7 +308,7 @@ def search(prepared: Prepared, backend: Any, *, on_probe: Any = None, phases: di
         curve, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
         reached = prepared.checker.peaks(curve, t_end, t_rep)
     states = prepared.checker.drive(curve, t_end).every(prepared.config.checker.substeps)
-    return RepairResult(prepared, found, states, reached, timed.seconds)
+    return RepairResult(prepared, found, states, reached, timed.seconds, ttr)
 
 
 def _scene(scenario: Any, config: Config) -> Scene:

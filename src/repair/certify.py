@@ -97,7 +97,9 @@ def certify(folder: Path) -> Certificate:
     content = _read(folder)
     status = str(content.get("status"))
     if content.get("solution_file") is None:
-        raise RepairError(f"{folder} holds no trajectory to certify: {content.get('status_sentence', status)}")
+        raise RepairError(
+            f"{folder} holds no trajectory to certify: {content.get('status_sentence', status)}"
+        )
     prepared = _prepare(folder, content)
     rows: list[CertificateRow] = []
     curve = read_curve(content.get("curve"))
@@ -105,11 +107,17 @@ def certify(folder: Path) -> Certificate:
         t_rep, t_end = float(content["f_ttr_s"]), float(content["t_end_s"])
         rows += _seam(content, curve, t_rep)
         rows += _derivatives(curve, prepared.limits)
-        rows += _clearance(curve, prepared.occupancy, prepared.scene.dt, t_end)
+        allowed = min([0.0, *prepared.config.repair.relax])
+        rows += _clearance(curve, prepared.occupancy, prepared.scene.dt, t_end, allowed)
         rows += _plane(prepared, curve, t_rep, t_end)
     rows += _official(folder, content, prepared)
     return Certificate(
-        folder, str(content.get("scenario")), str(content.get("backend")), status, content.get("f_ttr_s"), tuple(rows)
+        folder,
+        str(content.get("scenario")),
+        str(content.get("backend")),
+        status,
+        content.get("f_ttr_s"),
+        tuple(rows),
     )
 
 
@@ -123,7 +131,7 @@ def format_certificate(certificate: Certificate) -> str:
     lines.append(f"{'':{width}}  {'value':>10}  {'limit':>10}  {'margin':>10}  {'':8}  how")
     for row in certificate.rows:
         verdict = "ok" if row.ok else "VIOLATED"
-        value, limit, margin = (f"{x:10.4f}" for x in (row.value, row.limit, row.margin))
+        value, limit, margin = (f"{x + 0.0:10.4f}" for x in (row.value, row.limit, row.margin))
         how = f"{row.how}, {row.unit}" if row.unit else row.how
         lines.append(f"{row.name:{width}}  {value}  {limit}  {margin}  {verdict:8}  {how}")
     broken = [row.name for row in certificate.rows if not row.ok]
@@ -200,11 +208,15 @@ def _prepare(folder: Path, content: Mapping[str, Any]) -> Prepared:
 # -- rows --------------------------------------------------------------------------------------------
 
 
-def _at_most(name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE) -> CertificateRow:
+def _at_most(
+    name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE
+) -> CertificateRow:
     return CertificateRow(name, value, limit, limit - value, value <= limit + tolerance, how, unit)
 
 
-def _at_least(name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE) -> CertificateRow:
+def _at_least(
+    name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE
+) -> CertificateRow:
     return CertificateRow(name, value, limit, value - limit, value >= limit - tolerance, how, unit)
 
 
@@ -274,9 +286,12 @@ def _abs(low: float, high: float) -> float:
 
 
 def _clearance(
-    curve: UniformBSpline | BernsteinCurve, occupancy: Occupancy, dt: float, t_end: float
+    curve: UniformBSpline | BernsteinCurve, occupancy: Occupancy, dt: float, t_end: float, allowed: float
 ) -> list[CertificateRow]:
     """Distance to the nearest inflated box, by hull and by sampling; negative inside of it.
+
+    ``allowed`` is how far into a box a repair may go at most (``repair.relax``): boxes in (s, l) are
+    wider than the vehicles in them, and the true rectangles have a row of their own.
 
     The distance to a box is the largest of the four signed distances to its sides. Pieces are cut at
     the scenario's steps: in between the sides move linearly, and the Bernstein points of curve minus
@@ -293,7 +308,9 @@ def _clearance(
     edges = edges[(edges >= curve.t_start) & (edges <= t_end)]
     edges = edges[np.concatenate([[True], np.diff(edges) > 1e-8])]
     start, end = edges[:-1], edges[1:]
-    piece = np.clip(np.floor(((start + end) / 2 - curve.t_start) / duration), 0, len(points) - 1).astype(np.intp)
+    piece = np.clip(np.floor(((start + end) / 2 - curve.t_start) / duration), 0, len(points) - 1).astype(
+        np.intp
+    )
     origin = curve.t_start + piece * duration
     u0, u1 = (np.clip((x - origin) / duration, 0.0, 1.0) for x in (start, end))
     fine = _cut(points[piece], u0, u1)
@@ -310,8 +327,8 @@ def _clearance(
     if not np.isfinite(sampled):
         return []
     return [
-        _at_least("distance to the nearest inflated obstacle", least, 0.0, "exact", "m"),
-        _at_least("distance to the nearest inflated obstacle", sampled, 0.0, "sampled", "m"),
+        _at_least("distance to the nearest inflated obstacle", least, allowed, "exact", "m"),
+        _at_least("distance to the nearest inflated obstacle", sampled, allowed, "sampled", "m"),
     ]
 
 
@@ -344,11 +361,15 @@ def _plane(prepared: Prepared, curve: Curve, t_rep: float, t_end: float) -> list
     world = CollisionWorld(
         scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, substeps, official_shifts(scene.scenario)
     )
-    contact = world.contact(states.x, states.y, states.orientation, start=int(round(times[0] / scene.dt * substeps)))
+    contact = world.contact(
+        states.x, states.y, states.orientation, start=int(round(times[0] / scene.dt * substeps))
+    )
     rows = [
         _at_most("friction circle", reached.max_total_acceleration, limits.a_total, "sampled", "m/s²"),
         _at_most("lateral acceleration", reached.max_lateral_acceleration, limits.a_lat, "sampled", "m/s²"),
-        _at_least("first contact of the rectangles", contact.time if contact else t_end, t_end, "sampled", "s"),
+        _at_least(
+            "first contact of the rectangles", contact.time if contact else t_end, t_end, "sampled", "s"
+        ),
     ]
     if prepared.checker.road is not None:
         index = prepared.checker.road.first_off_road(states.x, states.y, states.orientation)
@@ -368,14 +389,22 @@ def _official(folder: Path, content: Mapping[str, Any], prepared: Prepared) -> l
         raise RepairError(f"the solution file {file} is not there any more")
     scene = prepared.scene
     own = () if scene.recorded_ego is None else (scene.recorded_ego.id,)
-    verdict = check_solution_file(file, scene.scenario, PlanningProblemSet([scene.planning_problem]), without=own)
-    rows = [_at_most("solution file against the curve", _difference(file, content, prepared), _STATE, "sampled", "m")]
+    verdict = check_solution_file(
+        file, scene.scenario, PlanningProblemSet([scene.planning_problem]), without=own
+    )
+    rows = [
+        _at_most(
+            "solution file against the curve", _difference(file, content, prepared), _STATE, "sampled", "m"
+        )
+    ]
     answers = (
         ("solution_feasible", verdict.feasible),
         ("obstacle_collision", verdict.collision_free),
         (f"boundary_collision ({verdict.road_method})", verdict.on_road),
     )
-    rows += [CertificateRow(name, float(ok), 1.0, float(ok) - 1.0, ok, "official", "") for name, ok in answers]
+    rows += [
+        CertificateRow(name, float(ok), 1.0, float(ok) - 1.0, ok, "official", "") for name, ok in answers
+    ]
     return rows
 
 

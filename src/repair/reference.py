@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _GRID_MAX = 2e8  # edges that the graph search may look at: a few seconds
 _JERK = 0.3  # weight of the jerk (m/s³) against the distance (m) to the searched profile
+_START_OFF = 1.0  # a reference may start this far from the ego [m]
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
 __all__ = ["SpeedProfile", "known_until", "make_reference", "plan_speed", "recorded_positions"]
@@ -346,6 +347,9 @@ def _positions(scene: Scene, solution: Any, path: Path) -> Array:
             positions[step] = state.position
     if not np.isfinite(positions[0]).all():
         raise ReferenceTrajectoryError(f"{path} has no state at the planning problem's initial time step")
+    off = float(np.hypot(*(positions[0] - [scene.initial_state.x, scene.initial_state.y])))
+    if not off <= _START_OFF:
+        raise ReferenceTrajectoryError(f"{path} starts {off:.0f} m from the ego's initial position")
     return positions
 
 

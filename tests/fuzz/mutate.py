@@ -7,6 +7,7 @@ A mutation takes a seeded generator and what it is to damage, and is found by it
 from __future__ import annotations
 
 import copy
+import math
 import random
 from collections.abc import Callable
 from xml.etree import ElementTree as ET
@@ -20,10 +21,12 @@ __all__ = ["BYTE_MUTATIONS", "XML_MUTATIONS", "config_text", "damage_bytes", "da
 Element = ET.Element
 XmlMutation = Callable[[random.Random, Element], None]
 
-ODD_NUMBERS = (
-    "nan", "NaN", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-320", "-5", "0", "-0", "", " ", "abc", "1,5", "0x10",
-    "１２", "7 8", str(10**30), str(-(10**30)), "2147483648", "1e9", "-1e9", "1e5", "None", "true", "1_0", "3.7",
+NUMBERS = (
+    "nan", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-320", "-5", "0", "-0", str(10**30), str(-(10**30)), "2147483648",
+    "1e9", "-1e9", "1e5", "1e-9", "1_0", "3.7", "-1", "1", "17", "１２",
 )  # fmt: skip
+# Numbers three times as often as what is none: the latter mostly ends in commonroad-io already.
+ODD_NUMBERS = (*NUMBERS * 3, "", " ", "abc", "1,5", "0x10", "7 8", "None", "true")
 ODD_STEPS = ("0", "-0.1", "nan", "inf", "-inf", "", "abc", "1e-9", "1e9", "1e-320", "1e308", "0.25", "5", "0.001", "1,0")
 ODD_NAMES = ("", "../../x", "a/b", "\u00e4\u00f6-1", "x" * 3000, "DEU_X-1_1_T-1", "C-", "-1_1", "_", "ZAM", "DEU_A-b_c_T-d")
 ODD_CONFIG = (
@@ -203,7 +206,8 @@ def shift_times(rng: random.Random, root: Element) -> None:
     for time in (root if owner is None else owner).iter("time"):
         for leaf in time.iter():
             if not len(leaf) and _is_number(leaf.text):
-                leaf.text = str(int(float(leaf.text or 0)) + shift)
+                value = float(leaf.text or 0)
+                leaf.text = str(int(value) + shift) if math.isfinite(value) else leaf.text
 
 
 def odd_time(rng: random.Random, root: Element) -> None:
@@ -399,6 +403,22 @@ def odd_header(rng: random.Random, root: Element) -> None:
         del root.attrib[name]
 
 
+def jitter(rng: random.Random, root: Element) -> None:
+    """Noise on many numbers: bounds that cross, bodies that jump."""
+    noise, share = rng.choice([0.001, 0.02, 0.3]), rng.choice([0.02, 0.3, 1.0])
+    for leaf in _numbers(root):
+        if leaf.text and not leaf.text.isdigit() and rng.random() < share:
+            leaf.text = repr(float(leaf.text) * (1.0 + rng.gauss(0.0, noise)))
+
+
+def scale_world(rng: random.Random, root: Element) -> None:
+    """Roads of a millimetre's or a hundred kilometres' length; a mirrored one, left and right swapped."""
+    x, y = rng.choice([(1e-3, 1e-3), (0.1, 0.1), (10.0, 10.0), (1e3, 1e3), (1.0, -1.0), (1.0, 0.0), (0.1, 10.0)])
+    for leaf in root.iter():
+        if leaf.tag in ("x", "y") and _is_number(leaf.text):
+            leaf.text = repr(float(leaf.text or 0) * (x if leaf.tag == "x" else y))
+
+
 def translate(rng: random.Random, root: Element) -> None:
     """The whole scenario somewhere else, as in UTM coordinates: nothing may depend on where."""
     shift = rng.choice([1e3, 5e5, 5e6, -1e8])
@@ -414,12 +434,13 @@ XML_MUTATIONS: dict[str, XmlMutation] = {
         odd_number, many_odd_numbers, scale_number, odd_attribute, deep_nesting, text_in_place_of_children, swap_ids,
         same_id, odd_reference, shift_times, odd_time, time_interval, drop_from_states, uncertain_value,
         uncertain_position, odd_shape, no_prediction, gap_in_prediction, obstacle_on_the_ego, odd_bound, odd_topology,
-        no_goal, odd_goal, second_problem, odd_start, odd_time_step, odd_header, translate,
+        no_goal, odd_goal, second_problem, odd_start, odd_time_step, odd_header, translate, jitter, scale_world,
     )
 }  # fmt: skip
 _GENERIC = (
     "delete_element", "delete_all_of_a_kind", "duplicate_element", "move_element", "shuffle_children", "rename_tag",
     "odd_number", "many_odd_numbers", "scale_number", "odd_attribute", "deep_nesting", "text_in_place_of_children",
+    "jitter", "scale_world", "translate",
 )  # fmt: skip
 
 

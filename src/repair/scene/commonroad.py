@@ -17,7 +17,7 @@ from repair.scene.bounds import crossings, lateral_bounds
 from repair.scene.frame import FrenetFrame
 from repair.scene.lead_in import drive_path
 from repair.scene.obstacles import Obstacle, last_predicted_step, obstacles_of
-from repair.scene.route import Lane, Route, lanes_of, plan_route
+from repair.scene.route import Lane, Route, goal_areas, lanes_of, plan_route
 from repair.scene.vehicle import Vehicle, load_vehicle
 from repair.scene.shapes import FAR
 from repair.types import Array, LateralBounds, frozen
@@ -334,13 +334,7 @@ def _goal_s(
     named = {i for ids in (goal.lanelets_of_goal_position or {}).values() for i in ids}
     entries: list[Array] = [lanes[i].center[:1] for i in route.goal_lanelets if i in named]
     if not named:
-        shapes = [p for st in goal.state_list if st.has_value("position") for p in getattr(
-            st.position, "shapes", [st.position])]  # fmt: skip
-        entries = [
-            np.asarray(p.shapely_object.exterior.coords)[:, :2]
-            for p in shapes
-            if hasattr(p, "shapely_object")
-        ]
+        entries = [np.asarray(area.exterior.coords)[:, :2] for area in goal_areas(goal)]
     starts = []
     for points in entries:
         projected = frame.to_frenet(points)

@@ -12,7 +12,7 @@ from repair.errors import ScenarioError
 from repair.scene.shapes import FAR
 from repair.types import Array, frozen
 
-__all__ = ["Lane", "Route", "lanes_of", "plan_route"]
+__all__ = ["Lane", "Route", "goal_areas", "lanes_of", "plan_route"]
 
 _NEAR = 5.0  # a start this far [m] outside of every lanelet is still taken
 _HEADING_MAX = np.deg2rad(100.0)
@@ -142,6 +142,27 @@ def locate(line: Array, point: Array) -> tuple[float, float, float]:
 # ---------------------------------------------------------------------- graph
 
 
+def goal_areas(goal: Any) -> list[Any]:
+    """The goal's positions as shapely polygons.
+
+    Raises
+    ------
+    ScenarioError
+        If one has a number that is not finite.
+    """
+    found = []
+    for state in goal.state_list:
+        if not state.has_value("position"):
+            continue
+        for shape in getattr(state.position, "shapes", [state.position]):
+            if not hasattr(type(shape), "shapely_object"):  # a point
+                continue
+            if not np.isfinite(getattr(shape, "vertices", shape.center)).all():
+                raise ScenarioError("the goal region has a vertex that is not finite")
+            found.append(shape.shapely_object)
+    return found
+
+
 def _goal_groups(goal: Any, lanes: Mapping[int, Lane]) -> list[set[int]]:
     """Goal lanelets, best knowledge first: ids given, lanelets at the shapes' centres, those touched."""
     import shapely
@@ -150,15 +171,8 @@ def _goal_groups(goal: Any, lanes: Mapping[int, Lane]) -> list[set[int]]:
     for ids in (goal.lanelets_of_goal_position or {}).values():
         named.update(i for i in ids if i in lanes)
     groups = [named] if named else []
-    shapes = [
-        shape
-        for state in goal.state_list
-        if state.has_value("position")
-        for shape in getattr(state.position, "shapes", [state.position])
-        if hasattr(shape, "shapely_object")
-    ]
-    if shapes and not named:
-        areas = [s.shapely_object for s in shapes]
+    areas = goal_areas(goal)
+    if areas and not named:
         centres = [a.centroid for a in areas]
         drivable = [lane for lane in lanes.values() if lane.drivable]
         for targets in (centres, areas):

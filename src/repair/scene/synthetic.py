@@ -304,7 +304,7 @@ class RoadDamage:
         From the ego's centre to the near face of the damage [m]. 15 * 1.55 + 8 = 31.25: at
         constant speed the ego enters the box inflated by S_offset = 8.0 m between 1.5 and 1.6 s.
     damage_length, damage_width : float
-        [m]; a broken patch in the right wheel track.
+        [m]; a broken stretch across both wheel tracks, so that the lane has to be left, as the paper says.
     damage_offset : float
         Of its middle from the middle of the lane [m], left positive.
     second_gap, second_speed : float
@@ -325,8 +325,8 @@ class RoadDamage:
     lane_width: float = 3.5
     damage_gap: float = 31.2
     damage_length: float = 3.0
-    damage_width: float = 1.6
-    damage_offset: float = -0.6
+    damage_width: float = 2.0
+    damage_offset: float = 0.0
     second_gap: float = 20.0
     second_speed: float = 16.0
     third_gap: float = -30.0
@@ -351,17 +351,17 @@ class RoadDamage:
 def scenario_2(damage: RoadDamage | None = None) -> tuple[Any, Any]:
     """Road damage ahead in dynamic traffic (Sec. V-C): a reconstruction from the paper's words.
 
-    The ego drives in the rightmost of three lanes towards a damage in its right wheel track; a car
+    The ego drives in the rightmost of three lanes towards a damage in the middle of its lane; a car
     ahead of it in the second lane and a car that changes from the third lane into the second, behind
     the first one, leave it one gap.
 
     Why these numbers. With 8.0 m inflated off the damage, TTC is 1.6 s. The ego's front is level with
     the damage itself at (31.2 - 2.15) / 15 = 1.94 s, and its body is past it if it has moved
-    0.2 + 0.84 = 1.04 m to the left by then. A quintic change by one lane (3.5 m) that peaks at
-    4.8 m/s² takes sqrt(5.77 * 3.5 / 4.8) = 2.05 s. Begun at 0.8 s it is 2.1 m over in time; begun at
-    1.2 s only 0.9 m, and 1.04 m would take a peak of 5.6 m/s². Both hold for the vehicles' bodies. The
-    *inflated* box cannot be left aside from 0.8 s on at the paper's 4.82 m/s²: 2.2 m in 0.8 s takes
-    6.9 m/s² at least, whatever the curve. So the paper's 0.8 s has to be understood with the
+    1.0 + 0.84 = 1.84 m to the left by then. A quintic change by one lane (3.5 m) that peaks at
+    4.8 m/s² takes sqrt(5.77 * 3.5 / 4.8) = 2.05 s: begun at 0.8 s it is 2.1 m over in time, begun at
+    1.2 s only 0.9 m. Both hold for the vehicles' bodies. The *inflated* box cannot be left aside from
+    0.8 s on at the paper's 4.82 m/s²: 3.0 m in 0.8 s takes 9.4 m/s² at least, whatever the curve. So
+    the paper's 0.8 s has to be understood with the
     offsets as soft; a backend that keeps them strictly has to begin earlier.
 
     Parameters

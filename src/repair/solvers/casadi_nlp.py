@@ -130,7 +130,9 @@ class CasadiBackend:
         try:
             model = build_model(self._structure(problem, timed=time_limit is not None))
         except (BackendError, ImportError) as error:
-            return SolveResult(SolveStatus.UNAVAILABLE, build_time=time.perf_counter() - begin, detail=str(error))
+            return SolveResult(
+                SolveStatus.UNAVAILABLE, build_time=time.perf_counter() - begin, detail=str(error)
+            )
         instance, points = self._instance(problem, model, warm_start)
         built = time.perf_counter()
         result = self._rounds(instance, points, deadline, time_limit)
@@ -238,10 +240,15 @@ class CasadiBackend:
                 break
             shape = (model.obstacle @ points)[instance.windows.row] + instance.origin
             room = _room(instance, shape, min(_ROAD_SLACK, 0.5 * trust) if trust else _ROAD_SLACK)
-            separation = separate(problem, instance.windows, len(model.obstacle), shape, room, separation.side)
+            separation = separate(
+                problem, instance.windows, len(model.obstacle), shape, room, separation.side
+            )
         detail = word
         if status is SolveStatus.SOLVED and not kept:
-            status, detail = SolveStatus.NUMERICAL_ERROR, f"{_worst(residuals)} after {self.config.rounds} rounds"
+            status, detail = (
+                SolveStatus.NUMERICAL_ERROR,
+                f"{_worst(residuals)} after {self.config.rounds} rounds",
+            )
         elif status is SolveStatus.TIME_LIMIT and time_limit is not None:
             detail = f"time limit of {time_limit:g} s"
         elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
@@ -374,7 +381,9 @@ class CasadiBackend:
             found[rows.family] = max(found.get(rows.family, 0.0), worst)
         if problem.lateral:
             v = model.velocity @ points
-            found["heading"] = max(0.0, float(np.max(np.abs(v[:, 1]) - np.tan(self.config.heading) * v[:, 0])))
+            found["heading"] = max(
+                0.0, float(np.max(np.abs(v[:, 1]) - np.tan(self.config.heading) * v[:, 0]))
+            )
             found["road"] = _road_violation(instance, points)
         found |= _plane_violations(instance, points)
         return found
@@ -475,8 +484,14 @@ def _start_violation(instance: _Instance) -> str:
     checks = (
         (v < -TOLERANCE, f"the start speed {v:.2f} m/s is below 0"),
         (v > limits.v_max + TOLERANCE, f"the start speed {v:.2f} m/s is above v_max {limits.v_max:.2f} m/s"),
-        (a < limits.a_min - TOLERANCE, f"the start acceleration {a:.2f} m/s² is below a_min {limits.a_min:.2f} m/s²"),
-        (a > limits.a_max + TOLERANCE, f"the start acceleration {a:.2f} m/s² is above a_max {limits.a_max:.2f} m/s²"),
+        (
+            a < limits.a_min - TOLERANCE,
+            f"the start acceleration {a:.2f} m/s² is below a_min {limits.a_min:.2f} m/s²",
+        ),
+        (
+            a > limits.a_max + TOLERANCE,
+            f"the start acceleration {a:.2f} m/s² is above a_max {limits.a_max:.2f} m/s²",
+        ),
         (
             total > limits.a_total + TOLERANCE,
             f"the start acceleration {total:.2f} m/s² is outside the friction circle of {limits.a_total:.2f} m/s²",
@@ -524,7 +539,12 @@ def _plane_violations(instance: _Instance, points: Array) -> dict[str, float]:
         middle = states[:, 0, 1] - 0.5 * reach**2 * problem.curvature_at(states[:, 0, 0])
         swing = reach * w / np.sqrt(square)
         ends = _room_of_ends(instance, points, 0.0, 0.0)
-        outside = (ends[0] - middle - swing, middle + swing - ends[1], ends[2] - middle + swing, middle - swing - ends[3])
+        outside = (
+            ends[0] - middle - swing,
+            middle + swing - ends[1],
+            ends[2] - middle + swing,
+            middle - swing - ends[3],
+        )
         found["body_on_road"] = max(0.0, *(float(np.max(x)) for x in outside))
     return found
 
@@ -536,7 +556,9 @@ def _road_violation(instance: _Instance, points: Array) -> float:
         return 0.0
     placed = (instance.model.position @ points)[row] + instance.origin
     own = problem.start[0, 1]
-    right, left = road_room(problem.bounds, placed[..., 0].min(axis=1), placed[..., 0].max(axis=1), own, own, 0.0)
+    right, left = road_room(
+        problem.bounds, placed[..., 0].min(axis=1), placed[..., 0].max(axis=1), own, own, 0.0
+    )
     l = placed[..., 1]  # noqa: E741
     return max(0.0, float(np.max(right[:, None] - l)), float(np.max(l - left[:, None])))
 

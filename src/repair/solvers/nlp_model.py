@@ -98,7 +98,9 @@ def _sub_bernstein(degree: int, start: float, end: float) -> Array:
     for i in range(p + 1):
         for k in range(i, p + 1):
             shift[i, k] = comb(k, i) * start ** (k - i) * (end - start) ** i
-    to_bernstein = np.array([[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)])
+    to_bernstein = np.array(
+        [[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)]
+    )
     return np.asarray(to_bernstein @ shift @ segment_matrix(p))
 
 
@@ -291,7 +293,9 @@ class Model:
         a[count:, :m] = matrix[self._soft]
         a[self._soft, m], a[count:, m] = 1.0, -1.0
         h = 1e-4 * np.eye(m + 1)
-        h[:m, :m] += 1e-4 * np.kron(np.eye(self.structure.axes), self.hessian[self.structure.degree :, self.structure.degree :])
+        h[:m, :m] += 1e-4 * np.kron(
+            np.eye(self.structure.axes), self.hessian[self.structure.degree :, self.structure.degree :]
+        )
         self._elastic_data = {"h": ca.DM(h), "a": _sparse(a)}
         shapes = {k: v.sparsity() for k, v in self._elastic_data.items()}
         self._elastic_qp = ca.conic("elastic", "daqp", shapes, {"error_on_fail": False})

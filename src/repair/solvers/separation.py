@@ -193,7 +193,8 @@ def _obstacles(
     chosen = side[n, w]
     # Who starts nearer than the margin keeps the distance it has.
     from_start = np.zeros(start.shape, dtype=bool)
-    from_start[np.arange(len(start)), side[:, 0]] = needed[:, 0] & np.isfinite(start[:, 0])
+    from_start[np.arange(len(start)), side[:, 0]] = needed[:, 0]
+    from_start &= np.isfinite(start) & (start >= floor - _TOUCH)
     keep = np.where(from_start, np.clip(start, floor, margin), margin)
     bound = cover[n, w, :, chosen] + keep[n, chosen][:, None]
     for k in range(4):

@@ -1,0 +1,285 @@
+"""The hard-constraint backend: its rows, its bounds, its statuses, and what it recomputes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests import toy
+from tests.contract import problems
+
+from repair.bspline import UniformBSpline
+from repair.config import CasadiConfig
+from repair.scene.frame import FrenetFrame
+from repair.solvers import casadi_nlp, nlp_model
+from repair.solvers.casadi_nlp import CasadiBackend
+from repair.solvers.nlp_model import build_model
+from repair.solvers.separation import ROAD, Windows, road_room, separate
+from repair.types import LateralBounds, Side, SolveStatus, frozen
+
+INF = np.inf
+
+
+def windows(start=0.0, count=4, width=0.1, degree=3):
+    edges = start + width * np.arange(count + 1)
+    row = np.arange(count)[:, None] * degree + np.arange(degree + 1)
+    return Windows(edges[:-1], edges[1:], row, np.arange(degree + 1) / degree)
+
+
+def separated(problem, side, w=None, room=None):
+    w = w or windows()
+    shape = np.zeros((*w.row.shape, 2))
+    sides = np.full((len(problem.occupancy), len(w.start)), side, dtype=np.intp)
+    return separate(problem, w, int(w.row.max()) + 1, shape, room, sides)
+
+
+# -- separation ------------------------------------------------------------------------------------
+
+
+def test_a_linear_edge_is_taken_over_exactly():
+    problem = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(3.0, 0.0))], lateral=False)
+    found = separated(problem, Side.BEHIND)
+    np.testing.assert_allclose(found.upper[:, 0], 20.0 + 3.0 * found.times - 0.1, atol=1e-9)
+    assert (found.upper_by[:, 0] == 100).all()
+    assert np.isinf(found.lower).all()
+    assert np.isinf(found.upper[:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("side", "end", "axis", "value"),
+    [(Side.AHEAD, "lower", 0, 25.1), (Side.LEFT, "lower", 1, 1.1), (Side.RIGHT, "upper", 1, -1.1)],
+)
+def test_sides_bound_their_own_axis(side, end, axis, value):
+    problem = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0))])
+    room = (np.full(4, -6.0), np.full(4, 6.0))
+    found = separated(problem, side, room=room)
+    np.testing.assert_allclose(getattr(found, end)[:, axis], value)
+
+
+def test_windows_that_straddle_a_step_cover_its_kink():
+    """Windows of 0.1 s that begin at 0.05 s see the edge of a box that jerks at every step."""
+    bare = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0))], lateral=False)
+    lower = bare.occupancy.lower.copy()
+    lower[0, ::2, 0] -= 0.4
+    problem = replace(bare, occupancy=replace(bare.occupancy, lower=frozen(lower)))
+    w = windows(start=0.05)
+    found = separated(problem, Side.BEHIND, w)
+    t = np.linspace(0.05, 0.45, 401)
+    edge = problem.occupancy.at(t)[0][0, :, 0] - problem.margin
+    for k in range(4):
+        share = (t - w.start[k]) / 0.1
+        own = (share >= 0.0) & (share <= 1.0)
+        points = found.upper[w.row[k], 0]
+        assert (points[0] + (points[-1] - points[0]) * share[own] <= edge[own] + 1e-9).all()
+
+
+def test_an_obstacle_that_is_there_for_an_instant_bounds_that_instant():
+    problem = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), present=(0.2, 0.2))], lateral=False)
+    found = separated(problem, Side.BEHIND)
+    bounded = np.isfinite(found.upper[:, 0])
+    np.testing.assert_allclose(found.times[bounded], [0.2])
+
+
+def test_an_obstacle_that_appears_within_a_window_bounds_all_of_it():
+    problem = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), present=(0.2, INF))], lateral=False)
+    found = separated(problem, Side.BEHIND, windows(start=0.05))
+    np.testing.assert_array_equal(np.isfinite(found.upper[:, 0]), found.times > 0.149)
+
+
+def test_who_starts_nearer_than_the_margin_keeps_its_distance():
+    problem = toy.problem([toy.box((0.04, 5.0), (-1.0, 1.0), v=(20.0, 0.0))], lateral=False)
+    found = separated(problem, Side.BEHIND)
+    np.testing.assert_allclose(found.upper[0, 0], 0.0, atol=1e-12)
+
+
+def test_the_tightest_of_two_wins_and_is_named():
+    boxes = [toy.box((30.0, 35.0), (-1.0, 1.0)), toy.box((20.0, 25.0), (-1.0, 1.0))]
+    found = separated(toy.problem(boxes, lateral=False), Side.BEHIND)
+    np.testing.assert_allclose(found.upper[:, 0], 19.9)
+    assert (found.upper_by[:, 0] == 101).all()
+
+
+def test_obstacles_out_of_the_roads_reach_ask_for_nothing():
+    problem = toy.problem([toy.box((20.0, 25.0), (7.0, 9.0))])
+    room = (np.full(4, -6.0), np.full(4, 6.0))
+    found = separated(problem, Side.BEHIND, room=room)
+    assert np.isinf(found.upper[:, 0]).all()
+    np.testing.assert_allclose(found.upper[:, 1], 6.0)
+    assert (found.upper_by[:, 1] == ROAD).all()
+
+
+def test_the_room_is_that_of_the_narrowest_place():
+    bounds = LateralBounds(frozen([0, 10, 20, 30]), frozen([-3, -1, -3, -3]), frozen([3, 3, 2, 3]))
+    right, left = road_room(bounds, np.array([5.0, 12.0]), np.array([15.0, 14.0]), 0.0, 0.0, 0.0)
+    np.testing.assert_allclose(right, [-1.0, -1.4])
+    np.testing.assert_allclose(left, [2.5, 2.6])
+
+
+# -- the plane -------------------------------------------------------------------------------------
+
+
+def test_accelerations_in_the_plane_are_those_of_the_driven_path():
+    """Against second differences of the positions on an axis whose curvature changes."""
+    u = np.linspace(0.0, 60.0, 200)
+    frame = FrenetFrame.from_points(np.column_stack([u, 8.0 * np.sin(u / 15.0)]))
+    s = np.arange(0.0, 60.0, 0.05)
+    problem = replace(toy.problem([]), curvature_s=frozen(s), curvature=frozen(frame.curvature(s)))
+    t = np.arange(0.0, 4.0, 1e-3)
+    position = np.column_stack([5.0 + 6.0 * t + 0.5 * t**2, 1.5 * np.sin(t)])
+    velocity = np.column_stack([6.0 + t, 1.5 * np.cos(t)])
+    acceleration = np.column_stack([np.ones_like(t), -1.5 * np.sin(t)])
+    states = np.stack([position, velocity, acceleration], axis=1)
+    along, across = casadi_nlp._plane_acceleration(problem, states)
+    xy = frame.to_cartesian(position[:, 0], position[:, 1])
+    truth = np.gradient(np.gradient(xy, t, axis=0), t, axis=0)
+    size = np.hypot(along, across)[5:-5]
+    np.testing.assert_allclose(size, np.hypot(*truth.T)[5:-5], atol=0.03)
+
+
+def bend(curvature=0.1, **keys):
+    s = np.arange(0.0, 200.0, 0.5)
+    kappa = curvature * np.clip((s - 15.0) / 10.0, 0.0, 1.0)
+    return replace(problems.guided(toy.problem([], lateral=False, t_end=5.0, **keys)), curvature_s=frozen(s),
+                   curvature=frozen(kappa))  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
+def test_it_slows_down_for_a_bend(solver):
+    """10 m/s into a curvature of 0.1 1/m would be 10 m/s²; the limit is 4 m/s² across."""
+    problem = bend()
+    result = CasadiBackend(CasadiConfig(solver=solver)).solve(problem)
+    assert result.status is SolveStatus.SOLVED, result.detail
+    samples = result.curve.sample(np.arange(0.0, 5.0, 1e-3))
+    lateral = problem.curvature_at(samples.position[:, 0]) * samples.velocity[:, 0] ** 2
+    assert lateral.max() <= 4.0 + 0.01
+    assert np.hypot(lateral, samples.acceleration[:, 0]).max() <= 8.0 + 1e-6
+
+
+# -- statuses --------------------------------------------------------------------------------------
+
+
+def test_residuals_see_what_a_curve_breaks():
+    backend, problem = CasadiBackend(), problems.static_block()
+    result = backend.solve(problem)
+    model = build_model(backend._structure(problem, False))
+    instance, points = backend._instance(problem, model, None)
+    separation, _, why = backend._open(instance, points)
+    assert why == ""
+    moved = result.curve.points - instance.origin
+    assert max(backend._residuals(instance, separation, moved).values()) <= 1e-6
+    moved = moved.copy()
+    moved[-3:, 0] += 30.0
+    broken = backend._residuals(instance, separation, moved)
+    assert broken["obstacles"] > 10.0
+    assert broken["jerk"] > 1.0
+
+
+def test_the_model_is_built_once():
+    backend = CasadiBackend(spacing=0.23)
+    backend.solve(problems.static_block())
+    before = build_model.cache_info()
+    again = backend.solve(problems.crossing_car())
+    after = build_model.cache_info()
+    assert after.misses == before.misses
+    assert again.status is SolveStatus.SOLVED
+
+
+def test_iteration_limit():
+    config = CasadiConfig(solver="ipopt", max_iterations=1)
+    result = CasadiBackend(config).solve(bend())
+    assert result.status is SolveStatus.ITERATION_LIMIT
+    assert "Maximum_Iterations_Exceeded" in result.detail
+    if result.curve is not None:
+        assert max(result.residuals.values()) <= 1e-6
+
+
+def test_a_missing_plugin_is_a_status():
+    result = CasadiBackend(CasadiConfig(solver="knitro")).solve(problems.static_block())
+    assert result.status is SolveStatus.UNAVAILABLE
+    assert result.curve is None
+    assert "knitro" in result.detail
+
+
+@pytest.mark.parametrize(
+    "word", ["Restoration_Failed", "Invalid_Number_Detected", "Error_In_Step_Computation"]
+)
+def test_other_words_of_the_solver_are_numerical_errors(monkeypatch, word):
+    monkeypatch.setattr(
+        nlp_model.Model, "solve", lambda self, x0, *rest: nlp_model.Solution(x0, word, 3, 0.0)
+    )
+    result = CasadiBackend().solve(problems.static_block())
+    assert result.status is SolveStatus.NUMERICAL_ERROR
+    assert word in result.detail
+
+
+def test_what_the_solver_throws_is_a_status():
+    backend, problem = CasadiBackend(spacing=0.31), problems.static_block()
+    model = build_model(backend._structure(problem, False))
+
+    class Throws:
+        def __call__(self, **keys):
+            raise RuntimeError("first line\nthe plugin gave up")
+
+    kept, model._function = model._function, Throws()
+    try:
+        result = backend.solve(problem)
+    finally:
+        model._function = kept
+    assert result.status is SolveStatus.NUMERICAL_ERROR
+    assert "the plugin gave up" in result.detail
+
+
+def test_claimed_but_not_kept_is_a_numerical_error(monkeypatch):
+    """A solver that calls anything solved is not believed."""
+
+    def lies(self, x0, *rest):
+        return nlp_model.Solution(x0 + np.linspace(0.0, 40.0, len(x0)), "Solve_Succeeded", 1, 0.0)
+
+    monkeypatch.setattr(nlp_model.Model, "solve", lies)
+    result = CasadiBackend().solve(problems.static_block())
+    assert result.status is SolveStatus.NUMERICAL_ERROR
+    assert result.curve is None
+    assert "is violated by" in result.detail
+
+
+@pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
+def test_it_keeps_quiet(solver, capfd):
+    backend = CasadiBackend(CasadiConfig(solver=solver), spacing=0.27)
+    for make in (*problems.FEASIBLE.values(), problems.too_near):
+        backend.solve(make())
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert captured.err == ""
+
+
+def test_two_obstacles_without_a_gap_are_named():
+    boxes = [toy.box((20.0, 30.0), (-2.0, 2.0)), toy.box((-60.0, -3.0), (-2.0, 2.0), v=(12.0, 0.0))]
+    bare = problems.forced(toy.problem(boxes, lateral=False, t_end=3.0))
+    side = bare.passing.side.copy()
+    side[1] = Side.AHEAD
+    result = CasadiBackend().solve(replace(bare, passing=replace(bare.passing, side=side)))
+    assert result.status is SolveStatus.INFEASIBLE
+    assert "obstacle 10" in result.detail
+
+
+@pytest.mark.parametrize("degree", [3, 4, 5])
+def test_degrees(degree):
+    problem = problems.static_block_left()
+    result = CasadiBackend(degree=degree, spacing=0.3).solve(problem)
+    assert result.status is SolveStatus.SOLVED, result.detail
+    assert isinstance(result.curve, UniformBSpline)
+    assert result.curve.degree == degree
+    assert problems.clearance(problem, result.curve) >= problem.margin - 1e-6
+
+
+def test_the_body_stays_on_a_narrow_road():
+    """Left of a box on a road that just holds the body: its ends must not swing out."""
+    bounds = LateralBounds(frozen([0.0, 500.0]), frozen([-3.0, -3.0]), frozen([2.4, 2.4]))
+    boxes = [toy.box((30.0, 40.0), (-2.0, 2.0))]
+    problem = problems.guided(toy.problem(boxes, bounds=bounds))
+    result = CasadiBackend().solve(problem)
+    assert result.status is SolveStatus.SOLVED, result.detail
+    samples = result.curve.sample(np.arange(0.1, problem.t_end, 0.1))
+    swing = 2.15 * np.sin(np.arctan2(samples.velocity[:, 1], samples.velocity[:, 0]))
+    assert np.abs(samples.position[:, 1] + swing).max() <= 2.4 + 1e-3

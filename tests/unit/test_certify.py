@@ -1,0 +1,108 @@
+"""The certificate: every margin from the files alone, and every lie found out."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from repair.api import repair
+from repair.certify import certify, format_certificate
+from repair.errors import RepairError
+
+
+@pytest.fixture(scope="module")
+def written(scenarios, tmp_path_factory):
+    """The hard repair of Scenario 1, as it is saved."""
+    folder = tmp_path_factory.mktemp("certify")
+    result = repair(scenarios / "DEU_Flensburg-6_1_T-1.xml", preset="scenario_1", backend="casadi")
+    result.save(folder, figure=False)
+    return folder
+
+
+@pytest.fixture
+def folder(written, tmp_path):
+    """A copy that a test may spoil."""
+    for file in written.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    return tmp_path
+
+
+def change(folder, edit):
+    content = json.loads((folder / "result.json").read_text())
+    edit(content)
+    (folder / "result.json").write_text(json.dumps(content))
+
+
+def broken(certificate):
+    return {row.name for row in certificate.rows if not row.ok}
+
+
+def test_the_hard_repair_of_scenario_1_is_certified(written):
+    certificate = certify(written)
+    assert certificate.ok, format_certificate(certificate)
+    assert certificate.f_ttr >= 2.0
+    rows = {(row.name, row.how): row for row in certificate.rows}
+    exact = rows["distance to the nearest inflated obstacle", "exact"]
+    sampled = rows["distance to the nearest inflated obstacle", "sampled"]
+    assert exact.value >= 0.1 - 1e-6
+    assert exact.value <= sampled.value + 1e-9
+    assert rows["solution_feasible", "official"].ok
+    assert "certified: every margin is kept" in format_certificate(certificate)
+
+
+def test_a_later_curve_is_found_out(folder):
+    """Control points pushed ahead: into the car, off the seam, beyond the solution file."""
+
+    def push(content):
+        for point in content["curve"]["control_points_m"]:
+            point[0] += 1.5
+
+    change(folder, push)
+    certificate = certify(folder)
+    assert not certificate.ok
+    assert {
+        "jump in position at the seam",
+        "distance to the nearest inflated obstacle",
+        "solution file against the curve",
+    } <= broken(certificate)
+    assert "VIOLATED" in format_certificate(certificate)
+
+
+def test_limits_are_those_of_the_configuration(folder):
+    change(folder, lambda content: content["config"]["limits"].update(a_min=-1.0))
+    assert "acceleration s'', least" in broken(certify(folder))
+
+
+def test_a_kink_in_the_curve_is_found_out(folder):
+    def kink(content):
+        content["curve"]["control_points_m"][-2][0] += 0.5
+
+    change(folder, kink)
+    assert "jerk |s'''|" in broken(certify(folder))
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda c: c.update(solution_file=None), "no trajectory to certify"),
+        (lambda c: c["provenance"].update(sha256="0" * 64), "is not the one the result was made from"),
+        (lambda c: c["provenance"].update(path="/nowhere.xml"), "is not there any more"),
+        (lambda c: c.update(solution_file="gone.xml"), "is not there any more"),
+        (lambda c: c["curve"].pop("degree"), "incomplete"),
+        (lambda c: c["curve"].update(type="samples"), "samples"),
+        (lambda c: c.pop("config"), "not the result of a repair"),
+    ],
+)
+def test_what_cannot_be_certified_is_said(folder, edit, words):
+    change(folder, edit)
+    with pytest.raises(RepairError, match=words):
+        certify(folder)
+
+
+def test_a_folder_without_a_result(tmp_path):
+    with pytest.raises(RepairError, match="holds no result.json"):
+        certify(tmp_path)
+    (tmp_path / "result.json").write_text("{")
+    with pytest.raises(RepairError, match="cannot be read"):
+        certify(tmp_path)
