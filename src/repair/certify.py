@@ -362,7 +362,7 @@ def _plane(prepared: Prepared, curve: Curve, t_rep: float, t_end: float) -> list
         scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, substeps, official_shifts(scene.scenario)
     )
     contact = world.contact(
-        states.x, states.y, states.orientation, start=int(round(times[0] / scene.dt * substeps))
+        states.x, states.y, states.orientation, start=round(float(times[0]) / scene.dt * substeps)
     )
     rows = [
         _at_most("friction circle", reached.max_total_acceleration, limits.a_total, "sampled", "m/s²"),

@@ -42,6 +42,12 @@ VERBS: tuple[Verb, ...] = (
     Verb("sweep", "repair all scenarios of a folder", verbs.sweep_arguments, verbs.sweep),
     Verb("table1", "the paper's Table I, paper and ours", verbs.table1_arguments, verbs.table1),
     Verb("table2", "the paper's Table II, times on this machine", verbs.table2_arguments, verbs.table2),
+    Verb(
+        "sensitivity",
+        "what the paper's free choices do to F-TTR and peaks",
+        verbs.sensitivity_arguments,
+        verbs.sensitivity,
+    ),
     Verb("figures", "draw the paper's Figures 4, 5 and 6", verbs.figures_arguments, verbs.figures),
     Verb("backends", "list the backends, and what is missing", verbs.no_arguments, verbs.backends),
     Verb("presets", "list the bundled presets", verbs.no_arguments, verbs.presets),

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from repair.types import Array
+
 if TYPE_CHECKING:
     from repair.scene.frame import CartesianPath
 
@@ -30,16 +32,18 @@ def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Pea
     """Peaks over the samples that ``keep`` selects (all by default).
 
     The longitudinal acceleration is the derivative of the signed speed, the lateral one speed times
-    the rate of the heading, both by second-order differences over the dense samples.
+    the rate of the heading, both by differences over the dense, equally spaced samples.
     """
-    selected = np.ones(len(path.t), dtype=bool) if keep is None else keep
     if len(path.t) < 3:
         zero = np.zeros(len(path.t))
         longitudinal, lateral = zero, zero
     else:
-        longitudinal = np.gradient(path.speed, path.t)
-        lateral = path.speed * np.gradient(path.heading, path.t)
-    longitudinal, lateral, speed = longitudinal[selected], lateral[selected], path.speed[selected]
+        step = path.t[1] - path.t[0]
+        longitudinal = _rate(path.speed, step)
+        lateral = path.speed * _rate(path.heading, step)
+    speed = path.speed
+    if keep is not None:
+        longitudinal, lateral, speed = longitudinal[keep], lateral[keep], speed[keep]
     return Peaks(
         float(speed.min()),
         float(speed.max()),
@@ -48,3 +52,12 @@ def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Pea
         float(np.abs(lateral).max()),
         float(np.hypot(longitudinal, lateral).max()),
     )
+
+
+def _rate(values: Array, step: float) -> Array:
+    """Derivative of equally spaced samples: central differences, one-sided at the ends."""
+    result = np.empty_like(values)
+    result[1:-1] = (values[2:] - values[:-2]) / (2.0 * step)
+    result[0] = (values[1] - values[0]) / step
+    result[-1] = (values[-1] - values[-2]) / step
+    return result

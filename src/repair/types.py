@@ -176,14 +176,17 @@ class Occupancy:
         nearest = np.rint(where)
         where = np.where(np.abs(where - nearest) < 1e-6, nearest, where)
         low = np.clip(np.floor(where), 0, len(self.t) - 1).astype(np.intp)
-        high = np.minimum(low + 1, len(self.t) - 1)
-        weight = (where - low)[None, :, None]
+        # On a step its own row counts alone: the next one may be NaN.
+        high = np.where(where > low, np.minimum(low + 1, len(self.t) - 1), low)
+        weight = (where - low)[:, None]
         outside = (where < 0) | (where > len(self.t) - 1)
-        exact = (weight == 0.0) | (high == low)[None, :, None]
-        lower = np.where(exact, self.lower[:, low], (1 - weight) * self.lower[:, low] + weight * self.lower[:, high])
-        upper = np.where(exact, self.upper[:, low], (1 - weight) * self.upper[:, low] + weight * self.upper[:, high])
-        lower[:, outside] = np.nan
-        upper[:, outside] = np.nan
+        lower, upper = self.lower[:, low], self.upper[:, low]
+        if (high != low).any():
+            lower = lower + weight * (self.lower[:, high] - lower)
+            upper = upper + weight * (self.upper[:, high] - upper)
+        if outside.any():
+            lower[:, outside] = np.nan
+            upper[:, outside] = np.nan
         return lower, upper
 
     def select(self, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Occupancy:

@@ -225,9 +225,27 @@ def table1(arguments: argparse.Namespace) -> int:
 def table2(arguments: argparse.Namespace) -> int:
     """The paper's Table II on this machine."""
     from repair.report import tables
+    from repair.report.timing import literal_transcription
 
     folder = os.environ.get("COMMONROAD_SCENARIOS")
-    table = tables.table2(folder, runs=arguments.runs, overrides=arguments.overrides)
+    table = tables.table2(folder, runs=arguments.runs, literal=literal_transcription(), overrides=arguments.overrides)
+    sys.stdout.write(getattr(table, f"to_{arguments.format}")())
+    return 0
+
+
+def sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair sensitivity``."""
+    parser.add_argument("scenario", choices=PAPER_SCENARIOS, help="one of the paper's scenarios")
+    table1_arguments(parser)
+
+
+def sensitivity(arguments: argparse.Namespace) -> int:
+    """What the free choices do to TTC, F-TTR and peak acceleration."""
+    from repair.report import sensitivity as report
+
+    number = PAPER_SCENARIOS.index(arguments.scenario) + 1
+    folder = os.environ.get("COMMONROAD_SCENARIOS")
+    table = report.sensitivity(number, folder, overrides=arguments.overrides)
     sys.stdout.write(getattr(table, f"to_{arguments.format}")())
     return 0
 

@@ -106,7 +106,8 @@ def start_inside():
 FEASIBLE = {
     f.__name__: f
     for f in (
-        free_road, static_block, static_block_left, crossing_car, closing_gap, start_at_top_speed, start_at_full_braking,
+        free_road, static_block, static_block_left, crossing_car, closing_gap, start_at_top_speed,
+        start_at_full_braking,
     )
 }  # fmt: skip
 #: name -> (problem, a word that the hard backend's sentence must hold)

@@ -14,7 +14,7 @@ from repair.bspline import UniformBSpline, derivative_matrix
 from repair.config import CasadiConfig
 from repair.passing import open_passings
 from repair.solvers.casadi_nlp import CasadiBackend
-from repair.solvers.nlp_model import bernstein_rows
+from repair.solvers.nlp_rows import bernstein_rows
 from repair.types import SolveStatus, frozen
 
 SOLVERS = st.sampled_from(["ipopt", "sqpmethod"])

@@ -12,7 +12,7 @@ from tests.contract import problems
 from repair.bspline import UniformBSpline
 from repair.config import CasadiConfig
 from repair.scene.frame import FrenetFrame
-from repair.solvers import casadi_nlp, nlp_model
+from repair.solvers import nlp_instance, nlp_model
 from repair.solvers.casadi_nlp import CasadiBackend
 from repair.solvers.nlp_model import build_model
 from repair.solvers.separation import ROAD, Windows, road_room, separate
@@ -47,7 +47,7 @@ def test_a_linear_edge_is_taken_over_exactly():
 
 
 @pytest.mark.parametrize(
-    ("side", "end", "axis", "value"),
+    "side, end, axis, value",
     [(Side.AHEAD, "lower", 0, 25.1), (Side.LEFT, "lower", 1, 1.1), (Side.RIGHT, "upper", 1, -1.1)],
 )
 def test_sides_bound_their_own_axis(side, end, axis, value):
@@ -130,7 +130,7 @@ def test_accelerations_in_the_plane_are_those_of_the_driven_path():
     velocity = np.column_stack([6.0 + t, 1.5 * np.cos(t)])
     acceleration = np.column_stack([np.ones_like(t), -1.5 * np.sin(t)])
     states = np.stack([position, velocity, acceleration], axis=1)
-    along, across = casadi_nlp._plane_acceleration(problem, states)
+    along, across = nlp_instance.plane_acceleration(problem, states)
     xy = frame.to_cartesian(position[:, 0], position[:, 1])
     truth = np.gradient(np.gradient(xy, t, axis=0), t, axis=0)
     size = np.hypot(along, across)[5:-5]
@@ -163,14 +163,14 @@ def test_residuals_see_what_a_curve_breaks():
     backend, problem = CasadiBackend(), problems.static_block()
     result = backend.solve(problem)
     model = build_model(backend._structure(problem, False))
-    instance, points = backend._instance(problem, model, None)
+    instance, points = backend._instance(problem, model)
     separation, _, why = backend._open(instance, points)
     assert why == ""
     moved = result.curve.points - instance.origin
-    assert max(backend._residuals(instance, separation, moved).values()) <= 1e-6
+    assert max(instance.residuals(separation, moved).values()) <= 1e-6
     moved = moved.copy()
     moved[-3:, 0] += 30.0
-    broken = backend._residuals(instance, separation, moved)
+    broken = instance.residuals(separation, moved)
     assert broken["obstacles"] > 10.0
     assert broken["jerk"] > 1.0
 

@@ -83,7 +83,7 @@ def test_a_kink_in_the_curve_is_found_out(folder):
 
 
 @pytest.mark.parametrize(
-    ("edit", "words"),
+    "edit, words",
     [
         (lambda c: c.update(solution_file=None), "no trajectory to certify"),
         (lambda c: c["provenance"].update(sha256="0" * 64), "is not the one the result was made from"),
@@ -101,7 +101,7 @@ def test_what_cannot_be_certified_is_said(folder, edit, words):
 
 
 def test_a_folder_without_a_result(tmp_path):
-    with pytest.raises(RepairError, match="holds no result.json"):
+    with pytest.raises(RepairError, match=r"holds no result\.json"):
         certify(tmp_path)
     (tmp_path / "result.json").write_text("{")
     with pytest.raises(RepairError, match="cannot be read"):

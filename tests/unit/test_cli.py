@@ -162,7 +162,7 @@ def test_a_solution_file_is_a_reference(
     # What was repaired no longer collides where it did.
     assert second["ttc_s"] is None or second["ttc_s"] > first["ttc_s"]
     assert main([*base[:2], "--reference", str(folder / "result.json")]) == 2
-    assert "is not a CommonRoad solution file" in capsys.readouterr().err
+    assert "solution file result.json is not XML" in capsys.readouterr().err
 
 
 # -- interrupts and pipes --------------------------------------------------------------------------

@@ -69,9 +69,16 @@ def run(monkeypatch, problem, config=None, **keys):
         monkeypatch.setattr(
             ego, name, lambda *a, kind=kind, made=made, **k: made.append(kind(*a, **k)) or made[-1]
         )
-    result = ego.EgoBackend(config or PLAIN, **keys).solve(problem)
+    backend = ego.EgoBackend(config or PLAIN, **keys)
+    result = backend.solve(problem)
     monkeypatch.undo()
-    return Run(costs[0], costs[-1], minima[0], minima[-1], result)
+    deformed = minima[0].points
+    # Where no limit is touched the backend takes the closed form and makes no cost of its own.
+    terms = backend._refinement_terms(deformed, 2 if problem.lateral else 1)
+    bounds = costs[-1].feasibility if len(costs) > 1 else backend._bounds(problem, deformed)[0][1]
+    stack = ego._stack(len(deformed), backend.spacing)
+    refinement = ego._RefineCost(deformed, terms, bounds, stack, 3, backend.config.precondition, None)
+    return Run(costs[0], refinement, minima[0], minima[-1], result)
 
 
 CASES = [

@@ -277,22 +277,30 @@ def test_solution_of_something_else_is_refused(scene, tmp_path, keys, message):
 def test_solution_elsewhere_is_refused(scene, tmp_path):
     states = driven(scene, make_reference(scene, ReferenceConfig(), NOBODY))
     path = write_solution(tmp_path, scene, replace(states, x=states.x + 5000.0))
-    with pytest.raises(ReferenceTrajectoryError, match="route"):
+    with pytest.raises(ReferenceTrajectoryError, match="5000 m from the ego's initial position"):
         make_reference(scene, ReferenceConfig(source="file", file=str(path)), NOBODY)
 
 
-@pytest.mark.parametrize("content", ["", "no xml", "<commonRoad/>", "<CommonRoadSolution benchmark_id='x'/>"])
-def test_what_is_no_solution_file_is_refused(scene, tmp_path, content):
+@pytest.mark.parametrize(
+    "content, message",
+    [
+        ("", "solution file other.xml is empty"),
+        ("no xml", "solution file other.xml is not XML: "),
+        ("<commonRoad/>", "not a CommonRoad solution"),
+        ("<CommonRoadSolution benchmark_id='x'/>", "not a CommonRoad solution"),
+    ],
+)
+def test_what_is_no_solution_file_is_refused(scene, tmp_path, content, message):
     path = tmp_path / "other.xml"
     path.write_text(content, encoding="utf-8")
-    with pytest.raises(ReferenceTrajectoryError, match="not a CommonRoad solution") as raised:
+    with pytest.raises(ReferenceTrajectoryError, match=message) as raised:
         make_reference(scene, ReferenceConfig(source="file", file=str(path)), NOBODY)
     assert isinstance(raised.value, RepairError)
     assert "\n" not in str(raised.value)
 
 
 def test_missing_files_are_named(scene, tmp_path):
-    with pytest.raises(ReferenceTrajectoryError, match="does not exist"):
+    with pytest.raises(ReferenceTrajectoryError, match=r"solution file .*no\.xml: no such file"):
         make_reference(scene, ReferenceConfig(source="file", file=str(tmp_path / "no.xml")), NOBODY)
     with pytest.raises(ReferenceTrajectoryError, match=r"reference\.file"):
         make_reference(scene, ReferenceConfig(source="file"), NOBODY)

@@ -178,8 +178,8 @@ def test_one_begin_of_the_lane_change_is_in_time_the_other_too_late():
         u = np.clip((level - begin) / duration, 0, 1)
         return p.lane_width * u**3 * (10 - 15 * u + 6 * u**2)
 
-    assert over(0.8) > needed + 0.5
-    assert over(1.2) < needed
+    assert over(0.8) > needed + 0.2  # 2.1 m against 1.84 m
+    assert over(1.2) < needed - 0.5  # 0.9 m
 
 
 def test_the_third_car_changes_lanes_smoothly_and_nobody_touches(opened):

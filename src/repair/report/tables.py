@@ -18,7 +18,18 @@ if TYPE_CHECKING:
     from repair.config import Config
     from repair.scene.commonroad import Scene
 
-__all__ = ["METHODS", "Method", "Section", "Table", "machine", "table1", "table2"]
+__all__ = [
+    "METHODS",
+    "PEAK_NAMES",
+    "Method",
+    "Section",
+    "Table",
+    "machine",
+    "peak_of",
+    "status_of",
+    "table1",
+    "table2",
+]
 
 # Table I of the paper: (F-)TTR [s], and peak [m/s²] or the word that stands in its place.
 _PAPER: dict[tuple[str, int], tuple[float, float | str]] = {
@@ -28,7 +39,7 @@ _PAPER: dict[tuple[str, int], tuple[float, float | str]] = {
     ("ego", 2): (0.8, 4.82),
 }
 _PAPER_TTC = {1: 2.9, 2: 1.6}
-_PEAK = {1: "max. lon. dec.", 2: "max. lat. acc."}
+PEAK_NAMES = {1: "max. lon. dec.", 2: "max. lat. acc."}
 
 
 @dataclass(frozen=True)
@@ -129,7 +140,7 @@ def _result(method: Method, number: int, scene: Scene, overrides: Sequence[str])
     peak = None
     # Also of a repair that the checker refuses: the paper's "infeasible" is of that kind.
     if probe is not None and probe.solve.curve is not None and (probe.feasible or method.driver == "at_ttr"):
-        peak = _peak(prepared, probe, number)
+        peak = peak_of(prepared, probe, number)
     row |= {
         "ttc_s": against(None, prepared.conflict.time)["ours"],
         "ttr_s": against(paper_ttr, ttr),
@@ -137,7 +148,8 @@ def _result(method: Method, number: int, scene: Scene, overrides: Sequence[str])
         "maneuver": _maneuver(found.best),
         "probes": [{"t_rep_s": round(p.t_rep, 6), "answer": _answer(p)} for p in found.probes],
     }
-    return {**row, "status": found.status.value, "status_text": _status(found, method)}
+    text = _answer(found.probes[0]) if method.driver == "at_ttr" and found.probes else status_of(found)
+    return {**row, "status": found.status.value, "status_text": text}
 
 
 def _run(config: Config, scene: Scene) -> tuple[Prepared, SearchResult, float | None]:
@@ -156,7 +168,8 @@ def _run(config: Config, scene: Scene) -> tuple[Prepared, SearchResult, float | 
     return prepared, found, found.f_ttr
 
 
-def _peak(prepared: Prepared, probe: Probe, number: int) -> float:
+def peak_of(prepared: Prepared, probe: Probe, number: int) -> float:
+    """The acceleration that Table I prints for a scenario [m/s²], of a repair that has a curve."""
     from repair.checker import SplicedCurve
 
     assert probe.solve.curve is not None
@@ -181,11 +194,10 @@ def _maneuver(probe: Probe | None) -> str | None:
     return None if probe is None or probe.maneuver is None else probe.maneuver.value
 
 
-def _status(found: SearchResult, method: Method) -> str:
+def status_of(found: SearchResult) -> str:
+    """In words: how the repair passes the conflict, and what the earliest refused t_rep came to."""
     if not found.probes:
         return found.status.sentence
-    if method.driver == "at_ttr":
-        return _answer(found.probes[0])
     refused = [p for p in found.probes if not p.feasible]
     parts = [] if found.best is None else [f"feasible ({_maneuver(found.best) or 'follow'})"]
     if refused:
@@ -211,7 +223,7 @@ def _section1(
         f"Scenario {number} ({origin_text(origin)}): TTC {decimal(head['paper'], 1)} s in the paper, "
         f"{decimal(head['ours'], 1)} s here, difference {decimal(head['difference'], 1, True)} s"
     )
-    peak = _PEAK[number]
+    peak = PEAK_NAMES[number]
     columns = (
         "", "(F-)TTR [s], paper", "ours", "difference",
         f"{peak} [m/s²], paper", "ours", "difference", "status",

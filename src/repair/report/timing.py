@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from repair.api import Prepared
     from repair.scene.commonroad import Scene
 
-__all__ = ["machine", "table2"]
+__all__ = ["literal_transcription", "machine", "table2"]
 
 _PACKAGES = (
     "numpy",
@@ -50,15 +50,7 @@ def machine() -> dict[str, Any]:
     except OSError:
         pass
     versions: dict[str, str | None] = {}
-    for name in (
-        "numpy",
-        "scipy",
-        "casadi",
-        "qpsolvers",
-        "osqp",
-        "commonroad-io",
-        "commonroad-drivability-checker",
-    ):
+    for name in _PACKAGES:
         try:
             versions[name] = version(name)
         except PackageNotFoundError:
@@ -71,6 +63,34 @@ def machine() -> dict[str, Any]:
         "blas_threads": os.environ.get("OMP_NUM_THREADS"),
         "versions": versions,
     }
+
+
+def literal_transcription() -> Callable[[Prepared], tuple[float, int]] | None:
+    """``literal`` of :func:`table2`, from ``benchmarks/literal.py`` of a checkout; None where there is none.
+
+    It bisects on the same grid and takes the direct kinematic check, so that what is compared is the
+    arithmetic; with CommonRoad's own check on every transition, as in the paper, it would be slower still.
+    """
+    import sys
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    # Beside the sources of a checkout (also where it is installed with -e); no package of that name counts.
+    file = Path(__file__).resolve().parents[3] / "benchmarks" / "literal.py"
+    name = "repair._literal"
+    spec = spec_from_file_location(name, file) if file.is_file() else None
+    if spec is None or spec.loader is None:
+        return None
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+
+    def search(prepared: Prepared) -> tuple[float, int]:
+        found = module.literal_search(
+            prepared.source, prepared.conflict, prepared.checker, prepared.config, "direct"
+        )
+        return found.wall_time, len({p.t_rep for p in found.probes})
+
+    return search
 
 
 def table2(

@@ -336,23 +336,33 @@ class EgoBackend:
         deadline: float | None,
     ) -> _Minimum:
         """Minimise J' from the deformed curve; both axes are coupled by the fitting term."""
-        config, n, p = self.config, len(initial.points), self.degree
+        n, p = len(initial.points), self.degree
         if n <= 2 * p:
             return deformed
-        axes = [0, 1] if problem.lateral else [0]
-        quadratic = _fitting_quadratic(deformed.points, p, self.spacing, config.refine.fit)
-        smooth = _smoothness(n, self.spacing, config.refine.smooth)
-        quadratic[0, :, 0, :] += smooth
-        quadratic[1, :, 1, :] += smooth
-        free = slice(p, n - p)
-        cost = _RefineCost(deformed.points, quadratic, smooth, feasibility[1], _stack(n, self.spacing), free, axes,
-                           config.precondition, deadline)  # fmt: skip
+        terms = self._refinement_terms(deformed.points, 2 if problem.lateral else 1)
         # Where no limit is touched J' is quadratic and its minimiser is a closed form.
-        points = cost.points(cost.origin)
-        if feasibility[1].evaluate(cost.stack @ points)[1] is None:
-            return _Minimum(points, cost(cost.origin)[0], 0, True)
+        move = -np.linalg.solve(terms.hessian, terms.slope)
+        points = deformed.points.copy()
+        points[p : n - p, : terms.axes] += move.reshape(terms.axes, -1).T
+        if feasibility[1].evaluate(_stack(n, self.spacing) @ points)[1] is None:
+            return _Minimum(points, terms.constant + 0.5 * float(terms.slope @ move), 0, True)
+        cost = _RefineCost(
+            deformed.points, terms, feasibility[1], _stack(n, self.spacing), p, self.config.precondition, deadline
+        )
         y, value, iterations, converged = self._lbfgs(cost, cost.origin)
         return _Minimum(cost.points(y), value, iterations, converged)
+
+    def _refinement_terms(self, points: Array, axes: int) -> _RefineTerms:
+        """lambda_s J_s + lambda_f J_f around the deformed control points (n, 2)."""
+        config, p, n = self.config.refine, self.degree, len(points)
+        free, m = slice(p, n - p), n - 2 * p
+        hessian = _fitting_hessian(points, p, self.spacing, config.fit, axes)
+        smooth = _smoothness(n, self.spacing, config.smooth)
+        for k in range(axes):
+            hessian[k * m : (k + 1) * m, k * m : (k + 1) * m] += smooth[free, free]
+        # The fitting term vanishes at the deformed curve; only smoothness has a slope there.
+        bent = smooth @ points
+        return _RefineTerms(hessian, bent[free, :axes].T.ravel(), 0.5 * float(np.vdot(points, bent)), axes)
 
 
 class _Cost:
@@ -414,41 +424,44 @@ class _Cost:
         return value, flat
 
 
+class _RefineTerms(NamedTuple):
+    """Quadratic part of J' in the free control points, axis by axis: c + g'x + x'Hx / 2."""
+
+    hessian: Array
+    slope: Array
+    constant: float
+    axes: int
+
+
 class _RefineCost:
     """J' over preconditioned coordinates; ``origin`` is the minimiser of its quadratic part."""
 
     def __init__(
         self,
         deformed: Array,
-        quadratic: Array,
-        smooth: Array,
+        terms: _RefineTerms,
         feasibility: Feasibility,
         stack: Array,
-        free: slice,
-        axes: list[int],
+        degree: int,
         precondition: bool,
         deadline: float | None,
     ) -> None:
         self.deformed, self.stack, self.feasibility = deformed, stack, feasibility
-        self.free, self.axes, self.deadline = free, axes, deadline
-        m, k = free.stop - free.start, len(axes)
-        block = quadratic[np.ix_(axes, range(free.start, free.stop), axes, range(free.start, free.stop))]
-        hessian = block.reshape(k * m, k * m)
-        # The fitting term vanishes at the deformed curve; only smoothness has a slope there.
-        slope = (smooth @ deformed)[free, axes].T.ravel()
-        self.constant = 0.5 * float(np.sum(deformed * (smooth @ deformed)))
-        factor = np.linalg.cholesky(hessian) if precondition else np.eye(k * m)
+        self.constant, self.axes, self.deadline = terms.constant, terms.axes, deadline
+        self.free = slice(degree, len(deformed) - degree)
+        m, axes = len(deformed) - 2 * degree, terms.axes
+        factor = np.linalg.cholesky(terms.hessian) if precondition else np.eye(axes * m)
         self.w = np.linalg.inv(factor).T
-        self.slope = self.w.T @ slope
-        self.curvature = self.w.T @ hessian @ self.w
+        self.slope = self.w.T @ terms.slope
+        self.curvature = self.w.T @ terms.hessian @ self.w
         self.origin = -np.linalg.solve(self.curvature, self.slope)
-        self.stack_w = np.einsum("rn,knx->krx", stack[:, free], self.w.reshape(k, m, k * m))
+        self.stack_w = np.einsum("rn,knx->krx", stack[:, self.free], self.w.reshape(axes, m, axes * m))
         self.base_derivatives = stack @ deformed
 
     def points(self, y: Array) -> Array:
         """Control points (n, 2) at the coordinates y."""
         points = self.deformed.copy()
-        points[self.free, self.axes] += (self.w @ y).reshape(len(self.axes), -1).T
+        points[self.free, : self.axes] += (self.w @ y).reshape(self.axes, -1).T
         return points
 
     def __call__(self, y: Array) -> tuple[float, Array]:
@@ -458,11 +471,11 @@ class _RefineCost:
         gradient = self.slope + bent
         value = self.constant + float(y @ (self.slope + 0.5 * bent))
         derivatives = self.base_derivatives.copy()
-        derivatives[:, self.axes] += (self.stack_w @ y).T
+        derivatives[:, : self.axes] += (self.stack_w @ y).T
         penalty, slope = self.feasibility.evaluate(derivatives)
         if slope is not None:
             value += penalty
-            gradient = gradient + np.einsum("krx,rk->x", self.stack_w, slope[:, self.axes])
+            gradient = gradient + np.einsum("krx,rk->x", self.stack_w, slope[:, : self.axes])
         return value, gradient
 
 
@@ -472,8 +485,8 @@ def _knot_basis(n: int, degree: int, spacing: float) -> tuple[Array, Array]:
     return frozen(basis_matrix(tau, n, degree, spacing)), frozen(basis_matrix(tau, n, degree, spacing, 1))
 
 
-def _fitting_quadratic(points: Array, degree: int, spacing: float, weight: float) -> Array:
-    """Hessian (2, n, 2, n) of lambda_f J_f around the deformed curve.
+def _fitting_hessian(points: Array, degree: int, spacing: float, weight: float, axes: int) -> Array:
+    """Hessian (axes m, axes m) of lambda_f J_f in the m free control points, around the deformed curve.
 
     J_f sums over the knots the displacement from the deformed curve, split along its direction of
     travel (axial, divided by 5) and across it: d_a**2 / 25 + d_r**2 (EGO-Planner, eq. 12-13).
@@ -483,10 +496,16 @@ def _fitting_quadratic(points: Array, degree: int, spacing: float, weight: float
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     # A standing curve has no direction of its own; the lane's is taken.
     moving = speed > 1e-3
-    along = np.where(moving[:, None], velocity / np.where(moving, speed, 1.0)[:, None], [1.0, 0.0])
-    across = np.column_stack([-along[:, 1], along[:, 0]])
-    metric = along[:, :, None] * along[:, None, :] / 25.0 + across[:, :, None] * across[:, None, :]
-    return np.asarray(2.0 * weight * np.einsum("ki,kab,kj->aibj", basis, metric, basis, optimize=True))
+    along_s = np.where(moving, velocity[:, 0] / np.where(moving, speed, 1.0), 1.0)
+    along_l = np.where(moving, velocity[:, 1] / np.where(moving, speed, 1.0), 0.0)
+    free = basis[:, degree : len(points) - degree]
+    scaled = 2.0 * weight * free.T
+    ss = (scaled * (along_s**2 / 25.0 + along_l**2)) @ free
+    if axes == 1:
+        return np.asarray(ss)
+    ll = (scaled * (along_l**2 / 25.0 + along_s**2)) @ free
+    sl = (scaled * (along_s * along_l * (1.0 / 25.0 - 1.0))) @ free
+    return np.block([[ss, sl], [sl, ll]])
 
 
 def make(config: Config) -> EgoBackend:

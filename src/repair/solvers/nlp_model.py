@@ -1,14 +1,10 @@
-"""The NLP of the hard-constraint backend: its rows as matrices, and the CasADi function made of them.
+"""The CasADi functions of the hard NLP, built once for each structure and parametric in all else.
 
 Everything that is linear in the control points (derivative limits, obstacles, room, direction of
-travel) is a constant matrix with bounds that change from problem to problem; only the accelerations
-and the curvature of the driven path are nonlinear. A :class:`Model` therefore depends on sizes and
-settings alone, is built once for each :class:`Structure` and kept for the life of the process.
-
-Rows are *Bernstein* control points: a polynomial piece lies in the convex hull of its Bernstein
-points, so that a bound on them is a bound on the curve at every time of the piece (Farouki, *The
-Bernstein polynomial basis: a centennial retrospective*, 2012). They span the same curve as the
-B-spline's control points and are the tighter hull.
+travel) is a constant matrix with bounds that change from problem to problem
+(:mod:`repair.solvers.nlp_rows`); only the accelerations and the curvature of the driven path, and
+where the ends of the body are, are nonlinear. A :class:`Model` therefore depends on sizes and settings
+alone and is kept for the life of the process.
 """
 
 from __future__ import annotations
@@ -16,16 +12,15 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import lru_cache
-from math import comb
 from typing import Any
 
 import numpy as np
 
-from repair.bspline import basis_matrix, derivative_matrix, segment_matrix
 from repair.errors import BackendError
-from repair.types import Array, frozen
+from repair.solvers.nlp_rows import Layout, Structure
+from repair.types import Array
 
-__all__ = ["SAMPLED", "STANDSTILL", "Model", "Solution", "Structure", "bernstein_rows", "build_model"]
+__all__ = ["SAMPLED", "STANDSTILL", "Model", "Solution", "build_model"]
 
 #: Parameters of every sample of the nonlinear rows: the part of s, s', s'', l, l', l'' that does not
 #: depend on the unknowns, and the axis' curvature as a line in s (value, slope).
@@ -33,119 +28,6 @@ SAMPLED = 8
 # Added to the squared speed [m²/s²] where the path's curvature divides by it.
 STANDSTILL = 0.01
 _DAQP_INFEASIBLE = -1
-
-
-@dataclass(frozen=True)
-class Structure:
-    """What a :class:`Model` depends on.
-
-    Attributes
-    ----------
-    n : int
-        Number of control points; the first ``degree`` of them are given.
-    degree : int
-    spacing : float
-        Knot spacing [s].
-    windows : int
-        Windows to a segment, within each of which an obstacle is passed on one side.
-    lateral : bool
-        l is unknown too.
-    sampled : bool
-        Obstacle rows at the Greville times instead of the windows' Bernstein points.
-    weights : tuple of float
-        Of acceleration, jerk and distance to the reference.
-    solver : str
-        ``ipopt`` or ``sqpmethod``.
-    max_iterations : int
-    tolerance : float
-    tangent : float
-        Largest l' / s'.
-    overhang : float
-        Half length of the body that the road must hold [m].
-    timed : bool
-        The solver asks after every iteration whether there is time left.
-    """
-
-    n: int
-    degree: int
-    spacing: float
-    windows: int
-    lateral: bool
-    sampled: bool
-    weights: tuple[float, float, float]
-    solver: str
-    max_iterations: int
-    tolerance: float
-    tangent: float
-    overhang: float
-    timed: bool = False
-
-    @property
-    def segments(self) -> int:
-        """Number of polynomial pieces."""
-        return self.n - self.degree
-
-    @property
-    def axes(self) -> int:
-        """1 or 2: s, or s and l."""
-        return 2 if self.lateral else 1
-
-
-def _sub_bernstein(degree: int, start: float, end: float) -> Array:
-    """Map (p+1, p+1) from a segment's B-spline points to the Bernstein points of its part [start, end]."""
-    p = degree
-    shift = np.zeros((p + 1, p + 1))
-    for i in range(p + 1):
-        for k in range(i, p + 1):
-            shift[i, k] = comb(k, i) * start ** (k - i) * (end - start) ** i
-    to_bernstein = np.array(
-        [[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)]
-    )
-    return np.asarray(to_bernstein @ shift @ segment_matrix(p))
-
-
-@lru_cache(maxsize=256)
-def bernstein_rows(n: int, degree: int, cuts: tuple[int, ...]) -> Array:
-    """Bernstein points of a uniform spline's pieces as a linear map of its control points.
-
-    Parameters
-    ----------
-    n, degree : int
-        Of the spline.
-    cuts : tuple of int
-        Into how many equal pieces each of the n - degree segments is cut.
-
-    Returns
-    -------
-    (sum(cuts) * degree + 1, n) array
-        Row ``k * degree + j`` is point j of piece k; neighbours share their end point. For degree 0
-        one row for each segment.
-    """
-    if degree == 0:
-        return frozen(np.eye(n))
-    matrix = np.zeros((sum(cuts) * degree + 1, n))
-    row = 0
-    for segment, pieces in enumerate(cuts):
-        for k in range(pieces):
-            part = _sub_bernstein(degree, k / pieces, (k + 1) / pieces)
-            matrix[row : row + degree + 1, segment : segment + degree + 1] = part
-            row += degree
-    return frozen(matrix)
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Linear rows of one axis: ``matrix`` (R, n) times that axis' control points."""
-
-    family: str
-    axis: int
-    matrix: Array
-
-    @property
-    def times(self) -> Array:
-        """Where along the control points each row acts, as an index (R,)."""
-        weight = np.abs(self.matrix)
-        return np.asarray(weight @ np.arange(self.matrix.shape[1]) / np.maximum(weight.sum(axis=1), 1e-12))
 
 
 @dataclass(frozen=True)
@@ -169,84 +51,18 @@ class Solution:
     violation: float
 
 
-class Model:
-    """One NLP: constant matrices, and the solver function.
-
-    Unknowns are the free control points ``x = [s_p .. s_{n-1}, l_p .. l_{n-1}]``.
-
-    Attributes
-    ----------
-    velocity, acceleration, jerk, position : Array
-        Rows (R, n) of Bernstein points of the curve and its derivatives; ``position`` by window.
-    """
+class Model(Layout):
+    """One NLP: its constant matrices, and the functions that solve it."""
 
     def __init__(self, structure: Structure) -> None:
         begin = time.perf_counter()
-        self.structure = s = structure
-        n, p, h, segments = s.n, s.degree, s.spacing, s.segments
-        # The given state fixes the first Bernstein points; there the hull must be tight to let through
-        # a start at a limit.
-        first = (max(s.windows, 4),) + (1,) * (segments - 1)
-        self.velocity = bernstein_rows(n - 1, p - 1, first) @ derivative_matrix(n, 1, h)
-        self.acceleration = bernstein_rows(n - 2, p - 2, (1,) * segments) @ derivative_matrix(n, 2, h)
-        self.jerk = bernstein_rows(n - 3, p - 3, (1,) * segments) @ derivative_matrix(n, 3, h)
-        self.position = bernstein_rows(n, p, (s.windows,) * segments)
-        if s.sampled:
-            greville = (np.arange(p, n) - (p - 1) / 2) * h
-            self.obstacle = basis_matrix(np.minimum(greville, segments * h), n, p, h)
-        else:
-            self.obstacle = self.position
-        self.tau = np.arange(1, segments * s.windows + 1) * (h / s.windows)
-        self.samples = tuple(basis_matrix(self.tau, n, p, h, k) for k in range(3))
-        self._quadratic()
-        self._function: Any = None
+        super().__init__(structure)
         self._deadline: _Deadline | None = None
-        self._linear = self._linear_rows()
-        self._compile()
+        try:
+            self._compile()
+        except RuntimeError as error:
+            raise BackendError(f"CasADi cannot make the solver: {_last_line(error)}") from error
         self.build_time = time.perf_counter() - begin
-
-    # -- matrices --------------------------------------------------------------------------------
-
-    def _quadratic(self) -> None:
-        """Exact integrals of the squared derivatives and of the squared distance (Gauss-Legendre)."""
-        s = self.structure
-        nodes, weights = np.polynomial.legendre.leggauss(s.degree + 1)
-        tau = ((np.arange(s.segments)[:, None] + 0.5 * (nodes + 1.0)) * s.spacing).ravel()
-        weight = np.tile(0.5 * s.spacing * weights, s.segments)
-        self.gauss_tau = tau
-        basis = [basis_matrix(tau, s.n, s.degree, s.spacing, k) for k in range(4)]
-        w_acceleration, w_jerk, w_reference = s.weights
-        self.hessian = 2.0 * sum(
-            w * basis[k].T @ (weight[:, None] * basis[k])
-            for w, k in ((w_acceleration, 2), (w_jerk, 3), (w_reference, 0))
-        )
-        self.reference_weight = 2.0 * w_reference * weight
-        self.pull = basis[0].T * self.reference_weight  # times the reference's positions at gauss_tau
-
-    def _linear_rows(self) -> list[Rows]:
-        rows = [
-            Rows("velocity", 0, self.velocity),
-            Rows("acceleration", 0, self.acceleration),
-            Rows("jerk", 0, self.jerk),
-            Rows("obstacles", 0, self.obstacle),
-        ]
-        if self.structure.lateral:
-            rows += [
-                Rows("velocity", 1, self.velocity),
-                Rows("acceleration", 1, self.acceleration),
-                Rows("jerk", 1, self.jerk),
-                Rows("obstacles", 1, self.obstacle),
-            ]
-            if self.structure.sampled:
-                rows.append(Rows("road", 1, self.position))
-        return rows
-
-    @property
-    def linear(self) -> list[Rows]:
-        """The linear rows by family; ``obstacles`` of l include the road."""
-        return self._linear
-
-    # -- CasADi ----------------------------------------------------------------------------------
 
     def _compile(self) -> None:
         import casadi as ca
@@ -260,8 +76,7 @@ class Model:
         hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
         objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        self._kept = [np.flatnonzero(np.abs(rows.matrix[:, p:]).max(axis=1) > 1e-12) for rows in self._linear]
-        matrix = _sparse(self._free_matrix())
+        matrix = _sparse(self.free_matrix())
         along, across, rest = self._nonlinear(axes, data)
         g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
@@ -284,8 +99,8 @@ class Model:
         """The QP in which all obstacle rows give way by the same, smallest possible amount."""
         import casadi as ca
 
-        matrix = self._free_matrix()
-        owner = np.repeat([rows.family == "obstacles" for rows in self._linear], [len(k) for k in self._kept])
+        matrix = self.free_matrix()
+        owner = np.repeat([rows.family == "obstacles" for rows in self.linear], [len(k) for k in self.kept])
         self._soft = np.flatnonzero(owner)
         count, m = matrix.shape
         a = np.zeros((count + len(self._soft), m + 1))
@@ -322,20 +137,6 @@ class Model:
             return None
         x = np.asarray(out["x"]).ravel()
         return x[:m], float(x[m])
-
-    def _free_matrix(self) -> Array:
-        """All linear rows that the unknowns can move, over the unknowns; the direction of travel last."""
-        s, p = self.structure, self.structure.degree
-        m = s.n - p
-        blocks = []
-        for rows, kept in zip(self._linear, self._kept, strict=True):
-            block = np.zeros((len(kept), m * s.axes))
-            block[:, rows.axis * m : (rows.axis + 1) * m] = rows.matrix[kept][:, p:]
-            blocks.append(block)
-        if s.lateral:
-            free = self.velocity[self._kept[0]][:, p:]
-            blocks += [np.hstack([s.tangent * free, sign * free]) for sign in (-1.0, 1.0)]
-        return np.vstack(blocks)
 
     def _nonlinear(self, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
         """Accelerations, curvature of the driven path, ends of the body at the samples.
@@ -387,27 +188,24 @@ class Model:
                 "qpsol": "daqp", "qpsol_options": {"error_on_fail": False},
                 "hessian_approximation": "exact", "hess_lag": curvature,
             }  # fmt: skip
-        try:
-            return ca.nlpsol("repair", s.solver, nlp, options)
-        except RuntimeError as error:
-            raise BackendError(f"CasADi cannot make the solver {s.solver!r}: {_last_line(error)}") from error
+        return ca.nlpsol("repair", s.solver, nlp, options)
 
-    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array, bool | None]:
+    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array, bool]:
         """The convex QP of the objective and the linear rows alone.
 
         Returns
         -------
         x : array
             Its solution, or ``x0`` where it has none.
-        feasible : bool or None
-            False if the linear rows contradict each other: then so does the NLP. None if daqp failed.
+        possible : bool
+            False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
         rows = self._qp_data["a"].shape[0]
         out = self._qp(**self._qp_data, g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
         word = int(self._qp.stats()["return_status"])
         if word > 0:
             return np.asarray(out["x"]).ravel(), True
-        return x0, False if word == _DAQP_INFEASIBLE else None
+        return x0, word != _DAQP_INFEASIBLE
 
     def solve(
         self, x0: Array, data: Array, slope: Array, low: Array, high: Array, deadline: float | None
@@ -440,39 +238,6 @@ class Model:
         except RuntimeError:  # sqpmethod has no word for a QP that fails
             return Solution(x, "QP_Failed", 0, violation)
         return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
-
-    def bounds(self, head: Array, lower: list[Array], upper: list[Array]) -> tuple[Array, Array]:
-        """Bounds of the rows that the unknowns can move, the given points' share taken off.
-
-        Parameters
-        ----------
-        head : (p, 2) array
-            The given control points.
-        lower, upper : list of arrays
-            Of the rows of :attr:`linear` in order, then of the nonlinear ones.
-        """
-        p, count = self.structure.degree, len(self._linear)
-        low, high = [], []
-        for rows, kept, below, above in zip(self._linear, self._kept, lower, upper, strict=False):
-            share = rows.matrix[kept][:, :p] @ head[:, rows.axis]
-            low.append(below[kept] - share)
-            high.append(above[kept] - share)
-        if self.structure.lateral:
-            given = self.velocity[self._kept[0]][:, :p] @ head
-            for sign in (-1.0, 1.0):
-                low.append(-(self.structure.tangent * given[:, 0] + sign * given[:, 1]))
-                high.append(np.full(len(given), np.inf))
-        return np.concatenate(low + lower[count:]), np.concatenate(high + upper[count:])
-
-    def unknowns(self, points: Array) -> Array:
-        """The unknowns (m,) among control points (n, 2)."""
-        return points[self.structure.degree :, : self.structure.axes].T.ravel()
-
-    def with_unknowns(self, points: Array, x: Array) -> Array:
-        """Control points (n, 2) with the unknowns set."""
-        changed = points.copy()
-        changed[self.structure.degree :, : self.structure.axes] = x.reshape(self.structure.axes, -1).T
-        return changed
 
 
 class _Deadline:

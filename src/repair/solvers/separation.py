@@ -58,7 +58,8 @@ class Windows:
 class Separation:
     """Bounds (R, 2) of the position rows ``[s, l]`` and whom they come from.
 
-    ``side`` (N, W) is the side taken of each obstacle in each window. ``why`` names a conflict known before any solver is asked; empty where there is none.
+    ``side`` (N, W) is the side taken of each obstacle in each window, ``room`` the road's room that was
+    used. ``why`` names a conflict known before any solver is asked; empty where there is none.
     """
 
     lower: Array
