@@ -12,6 +12,9 @@ from hypothesis import settings
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["MPLBACKEND"] = "Agg"
 
+# Now: a test may change the environment before the first one asks.
+_SCENARIOS = os.environ.get("COMMONROAD_SCENARIOS")
+
 settings.register_profile("repair", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("repair")
 
@@ -26,7 +29,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def scenarios() -> Path:
     """Return the folder COMMONROAD_SCENARIOS of CommonRoad files; without it skip, or fail when CI is set."""
-    value = os.environ.get("COMMONROAD_SCENARIOS")
+    value = _SCENARIOS
     if value and any(Path(value).glob("*.xml")):
         return Path(value).resolve()
     problem = f"no *.xml file in COMMONROAD_SCENARIOS={value}" if value else "COMMONROAD_SCENARIOS is not set"

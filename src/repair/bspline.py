@@ -147,7 +147,8 @@ class UniformBSpline:
         # Probes ask for the same offsets over and over; the matrices are worth keeping.
         rounded = np.round(tau, 12)
         stacked = _sampling(rounded.tobytes(), len(self.points), self.degree, self.spacing) @ self.points
-        position, velocity, acceleration, jerk = (a.copy() for a in np.split(stacked, 4))
+        k = len(times)
+        position, velocity, acceleration, jerk = (stacked[i * k : (i + 1) * k] for i in range(4))
         beyond = times - self.t_start - tau
         out = np.abs(beyond) > 1e-9
         if out.any():

@@ -37,7 +37,7 @@ class SceneConfig:
     """How the scenario is read."""
 
     vehicle: int = 1  # CommonRoad vehicle type; 1 is the Ford Escort
-    planning_problem: int | None = None
+    planning_problem: int | None = None  # id; null: the smallest
     horizon: float | None = None  # cap of the planning horizon [s]
     after_prediction: str = "remove"  # remove | hold | constant_velocity
     s_offset: float | None = None  # S_offset [m]; null: half the vehicle's length + 0.1
@@ -65,14 +65,14 @@ class ReferenceConfig:
 class LimitsConfig:
     """What a repaired trajectory may do; null means the vehicle's own limit."""
 
-    v_max: float | None = None
-    v_lat: float = 3.0
-    a_min: float | None = None
-    a_max: float | None = None
-    a_lat: float | None = None
-    a_total: float | None = None
-    j_lon: float = 60.0
-    j_lat: float = 60.0
+    v_max: float | None = None  # speed [m/s]; null: the vehicle's
+    v_lat: float = 3.0  # speed sideways, across the driven path [m/s]
+    a_min: float | None = None  # braking [m/s²]; null: minus a_total
+    a_max: float | None = None  # accelerating [m/s²]; null: what the engine gives at the initial speed
+    a_lat: float | None = None  # lateral acceleration [m/s²]; null: a_total
+    a_total: float | None = None  # friction circle [m/s²]; null: 0.9 of the vehicle's
+    j_lon: float = 60.0  # jerk along the path [m/s³], at most what the drivability checker can follow
+    j_lat: float = 60.0  # jerk sideways [m/s³]
 
 
 @dataclass
@@ -85,9 +85,9 @@ class RepairConfig:
     margin: float = 0.1  # distance hard backends keep from the inflated box [m]
     # Margins [m] that hard backends try next where none of the manoeuvres is feasible: down to the
     # vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
-    relax: list[float] = field(default_factory=lambda: [-0.1, -0.5])
+    relax: list[float] = field(default_factory=lambda: [-0.1, -0.5, -1.2, -2.5])
     lateral: str = "road"  # none | lane | same_direction | road
-    degree: int = 3
+    degree: int = 3  # of the B-spline
     spacing: float = 0.2  # knot spacing [s]
 
 
@@ -95,18 +95,18 @@ class RepairConfig:
 class DeformWeights:
     """lambda_s, lambda_c, lambda_d."""
 
-    smooth: float = 1.0
-    collision: float = 1000.0
-    feasible: float = 100.0
+    smooth: float = 1.0  # lambda_s
+    collision: float = 1000.0  # lambda_c
+    feasible: float = 100.0  # lambda_d
 
 
 @dataclass
 class RefineWeights:
     """lambda_s, lambda_d, lambda_f."""
 
-    smooth: float = 1.0
-    feasible: float = 100.0
-    fit: float = 1.0
+    smooth: float = 1.0  # lambda_s
+    feasible: float = 100.0  # lambda_d
+    fit: float = 1.0  # lambda_f
 
 
 @dataclass
@@ -115,16 +115,16 @@ class EgoConfig:
 
     deform: DeformWeights = field(default_factory=DeformWeights)
     refine: RefineWeights = field(default_factory=RefineWeights)
-    w_v: float = 1.0
-    w_a: float = 1.0
-    w_j: float = 1.0
+    w_v: float = 1.0  # the paper's weight of speeds beyond the limits
+    w_a: float = 1.0  # of accelerations
+    w_j: float = 1.0  # of jerks
     elastic: float = 0.95  # the paper's lambda
     joint: float = 1.5  # c_j as a multiple of c_m
-    reverse: float = 200.0  # weight of speeds below zero (not scaled by lambda_d: it is no limit of the paper)
-    max_iterations: int = 100
-    tolerance: float = 0.01
+    reverse: float = 200.0  # weight of speeds below zero, not scaled by lambda_d: no limit of the paper
+    max_iterations: int = 100  # of L-BFGS, in each stage (100 in the paper)
+    tolerance: float = 0.01  # of L-BFGS, on the gradient (0.01 in the paper)
     rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
-    precondition: bool = True
+    precondition: bool = True  # L-BFGS with the quadratic part made round: same optimum, faster
     guard: bool = True  # keep the deformed curve where refining it would bring back a collision
 
 
@@ -134,14 +134,14 @@ class CasadiConfig:
 
     solver: str = "ipopt"  # ipopt | sqpmethod
     obstacles: str = "hull"  # hull | sampled
-    w_acceleration: float = 1.0
-    w_jerk: float = 0.1
-    w_reference: float = 0.05
+    w_acceleration: float = 1.0  # cost of acceleration squared
+    w_jerk: float = 0.1  # cost of jerk squared
+    w_reference: float = 0.05  # cost of the distance to the reference squared
     heading: float = 0.7  # largest angle between the driven path and the axis [rad]
     overhang: float = 2.15  # half length of the body whose ends must stay on the road [m]
     rounds: int = 8  # solves around the own solution until the exact constraints are kept
-    max_iterations: int = 200
-    tolerance: float = 1e-8
+    max_iterations: int = 200  # of the solver, in each round
+    tolerance: float = 1e-8  # of the solver
 
 
 @dataclass
@@ -149,11 +149,11 @@ class QptrConfig:
     """The Bernstein QP baseline."""
 
     solver: str = "osqp"  # any QP solver that qpsolvers finds: osqp | daqp | clarabel | ...
-    degree: int = 5
+    degree: int = 5  # of the Bernstein polynomials
     spacing: float = 0.5  # duration of a piece [s]
     continuity: int = 2  # derivatives that are continuous at the joints
-    w_jerk: float = 1.0
-    w_deviation: float = 0.1
+    w_jerk: float = 1.0  # cost of jerk squared
+    w_deviation: float = 0.1  # cost of the distance to the reference squared
 
 
 @dataclass
@@ -177,16 +177,16 @@ class CheckerConfig:
     official: str = "leftover"  # leftover | always | never
     road: bool = True  # the ego's rectangle stays on the road
     limits: bool = True  # the repaired part keeps the limits
-    margin: bool = False  # the repaired part stays out of the inflated boxes, as the TTC asks of the reference
+    margin: bool = False  # the repaired part keeps out of the inflated boxes, as the TTC has it
 
 
 @dataclass
 class Config:
     """Everything that can be set."""
 
-    scenario: str | None = None
+    scenario: str | None = None  # what `repair run` takes where none is named
     driver: str = "f_ttr"  # f_ttr | at_ttr
-    backend: str = "ego"
+    backend: str = "ego"  # ego | casadi | qptr, or one that is registered
     seed: int = 0
     search: SearchConfig = field(default_factory=SearchConfig)
     scene: SceneConfig = field(default_factory=SceneConfig)

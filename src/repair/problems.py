@@ -111,6 +111,8 @@ class ProblemFactory:
         margin = settings.margin if margin is None else margin
         lateral = settings.lateral != "none"
         step = self.scene.dt
+        if t_rep > self.t_end - step + 1e-9:
+            return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
         count = int(np.ceil((self.t_end - t_rep) / step - 1e-6))
         times = t_rep + step * np.arange(count + 1)
         reference = self.reference.sample(times)

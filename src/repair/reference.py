@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _GRID_MAX = 2e8  # edges that the graph search may look at: a few seconds
 _JERK = 0.3  # weight of the jerk (m/s³) against the distance (m) to the searched profile
+_SPEED_MAX = 150.0  # faster than this a recording jumps [m/s]
 _START_OFF = 1.0  # a reference may start this far from the ego [m]
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
@@ -124,9 +125,12 @@ def recorded_positions(scene: Scene, config: ReferenceConfig) -> tuple[Array, st
     ReferenceTrajectoryError
         If there is no such obstacle or file.
     """
-    if config.source == "recorded":
-        return _recorded(scene, config.obstacle_id)
-    return _from_solution(scene, config.file)
+    recorded = config.source == "recorded"
+    positions, what = _recorded(scene, config.obstacle_id) if recorded else _from_solution(scene, config.file)
+    moved = np.hypot(*np.diff(positions[: known_until(positions)], axis=0).T)
+    if (moved > _SPEED_MAX * scene.dt).any():
+        raise ReferenceTrajectoryError(f"{scene.id}: {what} jumps by {moved.max():.3g} m within a time step")
+    return positions, what
 
 
 def _limit_at(scene: Scene, s: float) -> float:

@@ -162,8 +162,13 @@ def certify(arguments: argparse.Namespace) -> int:
 def sweep_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``repair sweep``."""
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of CommonRoad files")
-    parser.add_argument("--backend", nargs="+", default=["ego"], metavar="NAME")
-    parser.add_argument("--reference", nargs="+", default=["planner"], choices=_SOURCES, metavar="SOURCE")
+    parser.add_argument(
+        "--backend", action="extend", nargs="+", metavar="NAME", help="one or more (default: ego)"
+    )
+    parser.add_argument(
+        "--reference", action="extend", nargs="+", choices=_SOURCES, metavar="SOURCE",
+        help=f"one or more of {', '.join(_SOURCES)} (default: planner)",
+    )  # fmt: skip
     parser.add_argument("--preset", metavar="NAME")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="extend", nargs="+", default=[], dest="overrides"
@@ -173,6 +178,7 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timeout", type=float, default=300.0, metavar="S", help="wall time for one file [s]"
     )
+    parser.add_argument("--report", metavar="FILE.md", type=Path, help="write a report of the rows")
     parser.add_argument("--no-official", action="store_true", help="leave CommonRoad's own checker out")
 
 
@@ -182,18 +188,25 @@ def sweep(arguments: argparse.Namespace) -> int:
     from repair.study import sweep as run_sweep
 
     settings = SweepSettings(
-        backends=arguments.backend, references=arguments.reference, preset=arguments.preset,
+        backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"], preset=arguments.preset,
         overrides=arguments.overrides, official=not arguments.no_official, timeout=arguments.timeout,
         jobs=arguments.jobs,
     )  # fmt: skip
     rows = run_sweep(arguments.folder, settings)
-    if arguments.out is None:
+    if arguments.report is not None:
+        from repair.files import write_files
+        from repair.report.sweep import sweep_report
+
+        words = [f"--{k} {' '.join(v)}" for k, v in (("backend", settings.backends), ("reference", settings.references))]
+        text = sweep_report(rows, f"repair sweep {arguments.folder.name} {' '.join(words)}")
+        print(*write_files(arguments.report.parent, {arguments.report.name: text.encode()}))
+    if arguments.out is None and arguments.report is None:
         import csv
 
         table = csv.DictWriter(sys.stdout, COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
-    else:
+    elif arguments.out is not None:
         for path in write_sweep(rows, arguments.out, settings, arguments.folder):
             print(path)
     return 0
@@ -228,7 +241,9 @@ def table2(arguments: argparse.Namespace) -> int:
     from repair.report.timing import literal_transcription
 
     folder = os.environ.get("COMMONROAD_SCENARIOS")
-    table = tables.table2(folder, runs=arguments.runs, literal=literal_transcription(), overrides=arguments.overrides)
+    table = tables.table2(
+        folder, runs=arguments.runs, literal=literal_transcription(), overrides=arguments.overrides
+    )
     sys.stdout.write(getattr(table, f"to_{arguments.format}")())
     return 0
 

@@ -139,30 +139,30 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 things = st.tuples(
-    between(0.0, 110.0),
-    between(-2.0, 7.0),
-    st.sampled_from(["standing", "along", "along", "crossing"]),
-    between(-12.0, 20.0),
-    st.tuples(between(0.5, 12.0), between(0.4, 2.6), st.booleans()),
-    st.integers(1, 60),
+    between(22.0, 90.0),
+    st.sampled_from([0.0, 0.0, -0.4, 0.8, -1.6, 2.2, WIDTH, 2 * WIDTH]),
+    st.sampled_from(["standing", "along", "along", "crossing", "crossing"]),
+    between(-4.0, 9.0),
+    st.tuples(between(0.5, 8.0), between(0.4, 2.4), st.booleans()),
+    st.integers(10, 60),
     between(-1.6, 1.6),
 )
 
 
 @st.composite
 def cases(draw: st.DrawFn) -> tuple[Any, list[Thing], Config]:
-    radius = draw(st.sampled_from([np.inf, np.inf, 200.0, 60.0, -60.0, 25.0, -25.0, 12.0]))
-    line = np.stack([np.arange(0.0, 152.0, 2.0), np.zeros(76)], axis=1) if np.isinf(radius) else bend(radius, 100.0)
+    radius = draw(st.sampled_from([np.inf, np.inf, 200.0, -100.0, 60.0, -60.0, 30.0]))
+    line = np.stack([np.arange(0.0, 302.0, 2.0), np.zeros(151)], axis=1) if np.isinf(radius) else bend(radius, 30.0 + min(2.5 * abs(radius), 270.0))
     road, dt = Road(line), draw(st.sampled_from([0.1, 0.1, 0.2, 0.25, 0.04]))
-    steps = draw(st.integers(1, 50))
-    made = [Thing(30 + i, road, t, dt, steps) for i, t in enumerate(draw(st.lists(things, max_size=4)))]
+    steps = draw(st.integers(1, 60) | st.integers(40, 60))
+    made = [Thing(30 + i, road, t, dt, steps) for i, t in enumerate(draw(st.lists(things, min_size=1, max_size=4)))]
     scenario = Scenario(dt, ScenarioID(country_id="ZAM", map_name="Test", map_id=1))
-    scenario.add_objects(road.network(draw(st.integers(1, 3))))
+    scenario.add_objects(road.network(draw(st.sampled_from([1, 2, 3, 3]))))
     for thing in made:
         scenario.add_objects(thing.obstacle())
-    xy, heading = road.at(draw(between(0.0, 40.0)), draw(between(-1.0, 1.0)))
+    xy, heading = road.at(draw(between(6.0, 30.0)), draw(between(-0.3, 0.3)))
     start = InitialState(
-        time_step=0, position=xy, orientation=float(heading) + draw(between(-0.3, 0.3)), velocity=draw(between(0.0, 22.0)),
+        time_step=0, position=xy, orientation=float(heading) + draw(between(-0.05, 0.05)), velocity=draw(between(0.0, 17.0)),
         acceleration=draw(between(-2.0, 2.0)), yaw_rate=0.0, slip_angle=0.0,
     )  # fmt: skip
     goal = GoalRegion([CustomState(time_step=Interval(max(steps - 1, 0), steps))])

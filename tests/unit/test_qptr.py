@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.contract import problems
 from tests.toy import box, constant, problem
 
 from repair.baselines.corridor import NoCorridor, build_corridor
@@ -136,6 +137,15 @@ def test_solvers_agree_on_verdict_and_objective():
         assert len({a.status for a in answers}) == 1, (s, [a.detail for a in answers])
         objectives = [a.objective for a in answers if a.curve is not None]
         assert np.ptp(objectives) <= 1e-3 * (1.0 + min(objectives, default=0.0)) if objectives else True
+
+
+@pytest.mark.parametrize("name", sorted({**problems.FEASIBLE, **problems.INFEASIBLE}))
+def test_solvers_agree_on_the_contract_problems(name):
+    made = problems.FEASIBLE[name]() if name in problems.FEASIBLE else problems.INFEASIBLE[name][0]()
+    answers = [QptrBackend(QptrConfig(solver=s)).solve(made) for s in SOLVERS]
+    assert len({a.status for a in answers}) == 1, [a.detail for a in answers]
+    objectives = [a.objective for a in answers if a.curve is not None]
+    assert np.ptp(objectives) <= 1e-3 * (1.0 + min(objectives, default=0.0)) if objectives else True
 
 
 def test_swerves_and_ends_parallel_to_the_path():

@@ -100,7 +100,7 @@ def stages_figure(result: RepairResult, t_rep: float | None = None) -> Any:
             lines.append(
                 _line(result, curve, probe.t_rep, name, {"color": colour, "ls": dashes, "lw": width})
             )
-    return _profiles(result, lines, f"{_title(result)}: stages at $t_{{rep}}$ = {probe.t_rep:g} s")
+    return _profiles(result, lines, f"{_title(result)}\nstages at $t_{{rep}}$ = {probe.t_rep:g} s")
 
 
 def birdseye_figure(result: RepairResult) -> Any:
@@ -120,7 +120,8 @@ def birdseye_figure(result: RepairResult) -> Any:
         axes.add_collection(PolyCollection(outlines, facecolor="#ECECEC", edgecolor="none", zorder=0))
         edges = [v[:, :2] for x in lanelets for v in (x.left_vertices, x.right_vertices)]
         axes.add_collection(LineCollection(edges, colors="#B5B5B5", linewidths=0.6, zorder=0.5))
-        axes.plot(*reference.xy.T, color=_REFERENCE, lw=1.2, ls=":", label="reference", zorder=3)
+        # Above the repairs: one that stays on the reference must not hide it.
+        axes.plot(*reference.xy.T, color=_REFERENCE, lw=1.2, ls=":", label="reference", zorder=4.5)
         for probe, colour in _coloured(result):
             line = _probe_line(result, probe, colour)
             label = line.label if probe.feasible else f"{line.label.splitlines()[0]}, infeasible"
@@ -144,6 +145,9 @@ def birdseye_figure(result: RepairResult) -> Any:
 def paper_figures(backend: str = "ego", file_format: str = "png") -> dict[str, bytes]:
     """The paper's Figures 4 and 5 (Scenario 1) and 6 (Scenario 2), computed anew.
 
+    The view from above of Scenario 1 belongs to Figure 4; the other drawings of Scenario 2 are not in
+    the paper.
+
     Returns
     -------
     dict
@@ -159,9 +163,11 @@ def paper_figures(backend: str = "ego", file_format: str = "png") -> dict[str, b
             results.append(repair(path, load_config(name, backend=backend)))
     drawn = {
         "figure_4": profile_figure(results[0]),
+        "figure_4_birdseye": birdseye_figure(results[0]),
         "figure_5": stages_figure(results[0]),
         "figure_6": birdseye_figure(results[1]),
         "figure_6_profiles": profile_figure(results[1]),
+        "figure_6_stages": stages_figure(results[1]),
     }
     return {f"{name}.{file_format}": render(figure, file_format) for name, figure in drawn.items()}
 
@@ -342,9 +348,13 @@ def _mark_times(axes: Any, result: RepairResult) -> None:
 def _window(result: RepairResult, reference: _Line) -> tuple[_Window, float]:
     """Ranges of x and y that hold all that is driven with some room, and their ratio of height to width."""
     points = np.vstack([reference.xy, np.column_stack([result.states.x, result.states.y])])
-    low, high = points.min(axis=0) - 10.0, points.max(axis=0) + 10.0
+    network = result.prepared.scene.scenario.lanelet_network
+    road = np.vstack([v[:, :2] for x in network.lanelets for v in (x.left_vertices, x.right_vertices)])
+    # No further than the road goes.
+    low = np.maximum(points.min(axis=0) - 10.0, road.min(axis=0) - 2.0)
+    high = np.minimum(points.max(axis=0) + 10.0, road.max(axis=0) + 2.0)
     size, centre = high - low, 0.5 * (low + high)
-    shape = float(np.clip(size[1] / size[0], 0.3, 0.75))
+    shape = float(np.clip(size[1] / size[0], 0.22, 0.75))
     width = max(size[0], size[1] / shape)
     (x0, y0), (x1, y1) = (
         centre - 0.5 * width * np.array([1, shape]),
@@ -372,12 +382,13 @@ def _draw_vehicles(axes: Any, result: RepairResult, at: float, window: _Window) 
                 continue
             colour = _OBSTACLE if hit else "#8A8A8A"
             axes.fill(*outline.T, facecolor=colour, edgecolor=colour, alpha=dark, zorder=2)
-            if hit:
+            if hit and obstacle.role != "static":
                 labels.add(f"{k * dt:.3g} s", 0.5 * (outline.min(axis=0) + outline.max(axis=0)))
         if k < len(states):
             corners = _placed(body, states.x[k], states.y[k], states.orientation[k])
             axes.fill(*corners.T, facecolor=_EGO, edgecolor=_EGO, alpha=dark, zorder=5)
             labels.add(f"{k * dt:.3g} s", corners.mean(axis=0))
+    _draw_motion(axes, result, end, window)
     if result.status is SearchStatus.FOUND:
         driven = prepared.checker.drive(prepared.reference, prepared.t_reference)
         driven = driven.every(prepared.config.checker.substeps)
@@ -391,6 +402,20 @@ def _draw_vehicles(axes: Any, result: RepairResult, at: float, window: _Window) 
         axes.fill([], [], color=_OBSTACLE, alpha=0.75, label=f"obstacle {opponent} (dark: {at:.3g} s)")
     if any(o.id != opponent for o in scene.obstacles):
         axes.fill([], [], color="#8A8A8A", alpha=0.75, label=f"other obstacles, {at:.3g} s")
+
+
+def _draw_motion(axes: Any, result: RepairResult, end: int, window: _Window) -> None:
+    """Where the others' centres go until ``end``, those that move and are seen."""
+    label: str | None = f"others' motion, 0 to {end * result.prepared.scene.dt:.3g} s"
+    low, high = np.array(window).T
+    for obstacle in result.prepared.scene.obstacles:
+        outlines = [_outline(obstacle, k) for k in range(end + 1)]
+        centres = np.array([0.5 * (x.min(axis=0) + x.max(axis=0)) for x in outlines if x is not None])
+        if len(centres) < 2 or np.ptp(centres, axis=0).max() < 0.5:
+            continue
+        if ((low < centres) & (centres < high)).all(axis=1).any():
+            axes.plot(*centres.T, color="#555555", lw=1.0, ls=(0, (1, 2)), zorder=1.5, label=label)
+            label = None
 
 
 class _Labels:

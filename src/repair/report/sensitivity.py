@@ -1,9 +1,9 @@
-"""How far TTC, TTR, F-TTR and peak acceleration depend on what the paper leaves open: one factor at a time."""
+"""How far TTC, TTR, F-TTR and peak acceleration depend on what the paper leaves open, factor by factor."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["VARIATIONS", "Variation", "sensitivity"]
 
+_BACKENDS = {1: ("ego", "casadi"), 2: ("ego",)}
 _COARSE, _FINE = 0.4, 0.1  # the paper's Delta T, and one that shows smaller effects [s]
 
 
@@ -126,7 +127,7 @@ def sensitivity(
     scenario_dir: Path | str | None = None,
     *,
     variations: Sequence[Variation] | None = None,
-    backends: Sequence[str] = ("ego", "casadi"),
+    backends: Sequence[str] | None = None,
     overrides: Sequence[str] = (),
 ) -> Table:
     """Vary one free choice at a time around the preset of a scenario of the paper.
@@ -139,7 +140,8 @@ def sensitivity(
         See :func:`repair.report.tables.table1`.
     variations : sequence of Variation, optional
         :data:`VARIATIONS` of that scenario by default.
-    backends : sequence of str
+    backends : sequence of str, optional
+        By default ego, and casadi in Scenario 1; the first one's status is shown.
     overrides : sequence of ``"key=value"``
         Laid over the preset in every row, below what the row varies.
 
@@ -151,6 +153,7 @@ def sensitivity(
     from tqdm import tqdm
 
     scene = paper_scenes(scenario_dir, [number])[number]
+    backends = _BACKENDS[number] if backends is None else backends
     chosen = VARIATIONS[number] if variations is None else variations
     data = [
         _row(number, scene, variation, backends, overrides)
@@ -190,28 +193,31 @@ def _row(
         "factor": variation.factor, "value": variation.value, "preset": _preset_value(number, variation),
         "ttc_s": None, "ttr_s": None, "backends": {}, "status_text": "",
     }  # fmt: skip
-    prepared: dict[str, Prepared] = {}
+    configs = {name: _config(number, name, variation, overrides) for name in backends}
     try:
         seen = _varied(scene, variation)
-        for name in backends:
-            prepared[name] = prepare(seen, _config(number, name, variation, overrides))
+        first = prepare(seen, configs[backends[0]])
     except RepairError as error:
         return {**row, "status_text": f"not available: {error}"}
-    first = prepared[backends[0]]
     row["ttc_s"] = against(None, first.conflict.time)["ours"]
     row["ttr_s"] = against(None, evasive_ttr(first).ttr)["ours"]
     for name in backends:
         if name != backends[0] and variation.for_ego_only:
             continue
-        row["backends"][name] = _searched(prepared[name], number)
-    row["status_text"] = row["backends"][backends[0]]["status_text"]
+        # Preparing does not look at the backend, unless a preset has keys for it alone.
+        same = replace(configs[name], backend=first.config.backend) == first.config
+        prepared = replace(first, config=configs[name]) if same else prepare(seen, configs[name])
+        row["backends"][name] = _searched(prepared, number)
+    texts = {name: found["status_text"] for name, found in row["backends"].items()}
+    row["status_text"] = texts.pop(backends[0])
+    for name, text in texts.items():
+        if row["backends"][name]["f_ttr_s"] is None:
+            row["status_text"] += f"; {name}: {text}"
     return row
 
 
 def _searched(prepared: Prepared, number: int) -> dict[str, Any]:
     """F-TTR on both grids, and the peak on the coarse one."""
-    from dataclasses import replace
-
     from repair.search import search_f_ttr
     from repair.solvers.registry import make_backend
 
@@ -223,7 +229,11 @@ def _searched(prepared: Prepared, number: int) -> dict[str, Any]:
                 "status": "unavailable", "status_text": f"not available: {error}"}  # fmt: skip
     coarse, fine = (
         search_f_ttr(
-            prepared.source, prepared.conflict, backend, prepared.checker, replace(config.search, delta_t=step)
+            prepared.source,
+            prepared.conflict,
+            backend,
+            prepared.checker,
+            replace(config.search, delta_t=step),
         )
         for step in (_COARSE, _FINE)
     )
@@ -262,7 +272,7 @@ def _preset_value(number: int, variation: Variation) -> Any:
     from repair.scene.synthetic import RoadDamage
 
     config = load_config(preset=f"scenario_{number}", backend="ego")
-    values = [reduce(getattr, key.split("."), config) for key in variation.overrides]
+    values: list[Any] = [reduce(getattr, key.split("."), config) for key in variation.overrides]
     values += [getattr(RoadDamage(), key) for key in variation.damage]
     if len(values) > 1 and variation.overrides:  # the limits: one number, signs apart
         values = [max(values)]

@@ -11,7 +11,7 @@ from repair.errors import RepairError
 from repair.report.grid import Section, Table, against, decimal
 from repair.report.paper_cases import origin_of, origin_text, paper_scenes
 from repair.report.timing import machine, table2
-from repair.types import Probe, Reason, SearchResult, SolveStatus
+from repair.types import Probe, Reason, SearchResult, SolveStatus, Violation
 
 if TYPE_CHECKING:
     from repair.api import Prepared
@@ -183,11 +183,17 @@ def _answer(probe: Probe) -> str:
     if probe.feasible:
         return "feasible"
     if probe.solve.curve is not None:
-        return "rejected: " + "; ".join(v.detail or v.reason.value for v in probe.verdict.violations)
+        return "rejected: " + "; ".join(_words(v) for v in probe.verdict.violations)
     if Reason.NO_PASSAGE in {v.reason for v in probe.verdict.violations}:
         return "no way past is open"
     names = {SolveStatus.NO_CORRIDOR: "no corridor", SolveStatus.INFEASIBLE: "no solution"}
     return names.get(probe.solve.status, probe.solve.status.value.replace("_", " "))
+
+
+def _words(violation: Violation) -> str:
+    """Margin and collision name the obstacle only; who reads has to know which of the two it was."""
+    joint = {Reason.MARGIN: "margin of ", Reason.COLLISION: "contact with "}.get(violation.reason, "")
+    return joint + violation.detail if violation.detail else violation.reason.value.replace("_", " ")
 
 
 def _maneuver(probe: Probe | None) -> str | None:

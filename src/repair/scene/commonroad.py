@@ -360,7 +360,7 @@ def _speed_limit(
     for name in route.lanelets:
         try:
             limit = interpreter.speed_limit(frozenset({name}))
-        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        except (AssertionError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
             notes.append(f"the traffic signs of lanelet {name} cannot be read ({error})")
             limit = None
         entry = frame.to_frenet(lanes[name].center[:1])[0, 0]

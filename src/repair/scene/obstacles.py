@@ -40,6 +40,7 @@ __all__ = ["AFTER_PREDICTION", "Obstacle", "last_predicted_step", "obstacles_of"
 
 AFTER_PREDICTION = ("remove", "hold", "constant_velocity")
 
+_STEPS_MAX = 10**9
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
 
@@ -144,6 +145,8 @@ def _state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Pl
 
 def _steps(value: Any) -> tuple[int, int]:
     low, high = interval(value)
+    if not max(abs(low), abs(high)) <= _STEPS_MAX:
+        raise ScenarioError(f"a time step of an obstacle is {low:g}" if low == high else f"time steps go from {low:g} to {high:g}")
     return int(np.floor(low)), int(np.ceil(high))
 
 

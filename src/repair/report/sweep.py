@@ -1,0 +1,174 @@
+"""The report of a sweep: how many were repaired, what the official checker said, and why not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any
+
+__all__ = ["sweep_report"]
+
+Row = Mapping[str, Any]
+_REPAIRED = ("found", "no_conflict")
+
+
+def sweep_report(rows: Sequence[Row], command: str) -> str:
+    """Markdown of the rows of :func:`repair.study.sweep`.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        With the keys :data:`repair.study.COLUMNS`.
+    command : str
+        The command that made them, to stand beside the figures.
+    """
+    backends = list(dict.fromkeys(row["backend"] for row in rows))
+    references = list(dict.fromkeys(row["reference"] for row in rows))
+    parts = [
+        f"Made by `{command}`; search times are those of one run on one machine.",
+        "## How many\n\n" + _summary(rows, backends, references),
+        "## What CommonRoad's own checker says\n\n" + _official(rows),
+        "## Backends compared\n\n" + _compared(rows, backends),
+        "## F-TTR above the TTR\n\n" + _above(rows),
+        "## Not repaired, and why\n\n" + _reasons(rows),
+        "## Every file\n\n" + "\n\n".join(_files(rows, backends, reference) for reference in references),
+    ]
+    return "# Sweep\n\n" + "\n\n".join(parts) + "\n"
+
+
+def _table(head: Sequence[str], body: Iterable[Sequence[Any]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines += ["| " + " | ".join(_cell(v) for v in row) + " |" for row in body]
+    return "\n".join(lines)
+
+
+def _cell(value: Any) -> str:
+    if value is None or value == "":
+        return ""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text.replace("|", "/").replace("\n", " ")
+
+
+def _avoidable(row: Row) -> bool:
+    return isinstance(row["ttb_s"], float)
+
+
+def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[str]) -> str:
+    body = []
+    for reference in references:
+        for backend in backends:
+            own = [r for r in rows if r["backend"] == backend and r["reference"] == reference]
+            status = Counter(r["status"] for r in own)
+            conflicts = [r for r in own if r["status"] not in ("no_conflict", "input_error", "crash", "timeout")]
+            braking = [r for r in conflicts if _avoidable(r)]
+            times = [1e3 * r["search_time_s"] for r in own if r["search_time_s"] is not None and r["probes"]]
+            body.append((
+                reference, backend, len(own), status["no_conflict"], status["found"], status["none_feasible"],
+                len(own) - sum(status[s] for s in ("no_conflict", "found", "none_feasible")),
+                f"{sum(r['status'] in _REPAIRED for r in braking)} of {len(braking)}",
+                round(median(times), 1) if times else None,
+            ))  # fmt: skip
+    head = ("reference", "backend", "files", "no conflict", "repaired", "none feasible", "other",
+            "repaired of those that braking at 8 m/s² avoids", "median search [ms]")  # fmt: skip
+    return _table(head, body)
+
+
+def _official(rows: Sequence[Row]) -> str:
+    judged = [r for r in rows if r["official_feasible"] is not None]
+    keys = ("official_feasible", "official_collision_free", "official_on_road")
+    rejected = [r for r in judged if not all(r[k] for k in keys)]
+    methods = ", ".join(f"{k}: {n}" for k, n in Counter(r["road_method"] for r in judged).items())
+    text = (
+        f"{len(judged)} trajectories (repaired, or the reference where there is no conflict) were written as "
+        f"solution files, read back and judged; {len(rejected)} were rejected. Road boundary by {methods or '-'}."
+    )
+    if rejected:
+        body = [[r[k] for k in ("file", "backend", "reference", "status", *keys)] for r in rejected]
+        text += "\n\n" + _table(("file", "backend", "reference", "status", "feasible", "no collision", "road"), body)
+    return text
+
+
+def _value(row: Row) -> float:
+    if row["status"] == "no_conflict":
+        return float("inf")
+    return float(row["f_ttr_s"]) if row["f_ttr_s"] is not None else -1.0
+
+
+def _compared(rows: Sequence[Row], backends: Sequence[str]) -> str:
+    cases: dict[tuple[str, str], dict[str, Row]] = {}
+    for row in rows:
+        cases.setdefault((row["file"], row["reference"]), {})[row["backend"]] = row
+    lines = []
+    for other in backends:
+        pairs = [c for c in cases.values() if "casadi" in c and other in c]
+        if other == "casadi" or not pairs:
+            continue
+        lower = [c for c in pairs if _value(c["casadi"]) < _value(c[other]) - 1e-9]
+        higher = sum(_value(c["casadi"]) > _value(c[other]) + 1e-9 for c in pairs)
+        share = 100.0 * (1.0 - len(lower) / len(pairs))
+        names = "; ".join(f"{c['casadi']['file']} ({c['casadi']['reference']})" for c in lower)
+        lines.append(
+            f"- `casadi` against `{other}`: F-TTR not below in {len(pairs) - len(lower)} of {len(pairs)} cases "
+            f"({share:.1f} %), above in {higher}." + (f" Below: {names}." if lower else "")
+        )
+    return "\n".join(lines) or "One backend only."
+
+
+def _above(rows: Sequence[Row]) -> str:
+    body = []
+    for r in rows:
+        if r["status"] == "found" and isinstance(r["ttr_s"], float) and r["f_ttr_s"] > r["ttr_s"] + 1e-9:
+            harder = r["peak_deceleration_mps2"] is not None and r["peak_deceleration_mps2"] < -8.0
+            sideways = r["maneuver"] in ("left", "right")
+            why = "brakes harder than 8 m/s²" if harder else "swerves" if sideways else "changes speed otherwise"
+            if sideways and harder:
+                why = "brakes and swerves"
+            body.append((
+                r["file"], r["reference"], r["backend"], r["f_ttr_s"], r["ttr_s"], r["maneuver"],
+                round(r["peak_deceleration_mps2"], 2), why,
+            ))  # fmt: skip
+    if not body:
+        return "None."
+    head = ("file", "reference", "backend", "F-TTR [s]", "TTR [s]", "manoeuvre", "a_min [m/s²]", "how")
+    return (
+        "The TTR is that of fixed manoeuvres (full braking at 8 m/s², kick-down, steering); a repair may brake "
+        "up to its own limits, or combine.\n\n" + _table(head, body)
+    )
+
+
+def _reasons(rows: Sequence[Row]) -> str:
+    missed = [r for r in rows if r["status"] not in _REPAIRED]
+    if not missed:
+        return "Everything was repaired."
+    head = ("file", "reference", "backend", "status", "conflict", "TTC [s]", "TTB [s]", "what was tried, and what it failed on")
+    body = [
+        (r["file"], r["reference"], r["backend"], r["status"], r["conflict"], r["ttc_s"], r["ttb_s"], r["detail"])
+        for r in missed
+    ]
+    return _table(head, body)
+
+
+def _files(rows: Sequence[Row], backends: Sequence[str], reference: str) -> str:
+    own: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        if row["reference"] == reference:
+            own.setdefault(row["file"], {})[row["backend"]] = row
+    head = ["file", "conflict", "TTC [s]", "TTB [s]", "TTR [s]"]
+    for backend in backends:
+        head += [f"{backend} F-TTR [s]", "manoeuvre", "ms"]
+    body = []
+    for file, cases in own.items():
+        first = next(iter(cases.values()))
+        behind = ", from behind" if first["from_behind"] else ""
+        cells: list[Any] = [file, f"{first['conflict'] or ''}{behind}", *(first[k] for k in ("ttc_s", "ttb_s", "ttr_s"))]
+        for backend in backends:
+            r = cases.get(backend)
+            if r is None:
+                cells += ["", "", ""]
+                continue
+            shown = r["f_ttr_s"] if r["status"] == "found" else r["status"]
+            spent = None if r["search_time_s"] is None else round(1e3 * r["search_time_s"], 1)
+            cells += [shown, r["maneuver"], spent]
+        body.append(cells)
+    return f"### Reference: {reference}\n\n" + _table(head, body)
