@@ -107,7 +107,7 @@ def certify(folder: Path) -> Certificate:
         t_rep, t_end = float(content["f_ttr_s"]), float(content["t_end_s"])
         rows += _seam(content, curve, t_rep)
         rows += _derivatives(curve, prepared.limits)
-        allowed = min([0.0, *prepared.config.repair.relax])
+        allowed = _allowed(content, prepared)
         rows += _clearance(curve, prepared.occupancy, prepared.scene.dt, t_end, allowed)
         rows += _plane(prepared, curve, t_rep, t_end)
     rows += _official(folder, content, prepared)
@@ -285,13 +285,24 @@ def _abs(low: float, high: float) -> float:
     return float(max(-low, high))
 
 
+def _allowed(content: dict[str, Any], prepared: Prepared) -> float:
+    """How far into the inflated boxes the repair may go [m, negative]: a hard backend says itself.
+
+    Boxes in (s, l) are wider than the vehicles in them; a soft backend may enter them as far as the
+    most that hard ones are allowed to (``repair.relax``), and the true rectangles have a row of their own.
+    """
+    best = [p for p in content["probes"] if p["feasible"] and p["t_rep_s"] == content["f_ttr_s"]]
+    if best and "obstacles" in best[0]["residuals"] and best[0].get("margin_m") is not None:
+        return min(0.0, float(best[0]["margin_m"]))
+    return min([0.0, *prepared.config.repair.relax])
+
+
 def _clearance(
     curve: UniformBSpline | BernsteinCurve, occupancy: Occupancy, dt: float, t_end: float, allowed: float
 ) -> list[CertificateRow]:
     """Distance to the nearest inflated box, by hull and by sampling; negative inside of it.
 
-    ``allowed`` is how far into a box a repair may go at most (``repair.relax``): boxes in (s, l) are
-    wider than the vehicles in them, and the true rectangles have a row of their own.
+    ``allowed`` is how far into a box the repair may go at most.
 
     The distance to a box is the largest of the four signed distances to its sides. Pieces are cut at
     the scenario's steps: in between the sides move linearly, and the Bernstein points of curve minus

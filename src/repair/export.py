@@ -183,6 +183,7 @@ def _probe(result: RepairResult, probe: Probe) -> dict[str, Any]:
             for v in probe.verdict.violations
         ],
         "maneuver": probe.maneuver.value if probe.maneuver is not None else None,
+        "margin_m": _number(probe.margin),
         "tried": list(probe.tried),
         "solver_status": solve.status.value,
         "solver_detail": solve.detail,

@@ -144,7 +144,7 @@ def _probe(
         maneuver = problem.passing.maneuver if problem.passing is not None else None
         name = maneuver.value if maneuver is not None else "follow"
         tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
-        probe = Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin)
+        probe = Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=problem.margin)
         if best is None or _better(probe, best):
             best = probe
         if sides == "first" and probe.feasible:

@@ -445,7 +445,7 @@ class Conflict:
 
 @dataclass(frozen=True)
 class Probe:
-    """One visited t_rep: what was solved and what the checker said."""
+    """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said."""
 
     t_rep: float
     solve: SolveResult
@@ -453,6 +453,7 @@ class Probe:
     maneuver: Maneuver | None = None
     check_time: float = 0.0
     tried: tuple[str, ...] = ()
+    margin: float | None = None
 
     @property
     def feasible(self) -> bool:
