@@ -76,7 +76,9 @@ class Prepared:
     @property
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
-        return ProblemFactory(self.scene, self.config, self.limits, self.occupancy, self.reference, self.t_end)
+        return ProblemFactory(
+            self.scene, self.config, self.limits, self.occupancy, self.reference, self.t_end
+        )
 
 
 def detect_conflict(
@@ -157,7 +159,8 @@ def prepare(scene: Scene, config: Config) -> Prepared:
         wanted = conflict.time + config.repair.after_conflict
     elif np.isfinite(conflict.time) and wanted <= conflict.time:
         raise ConfigError(
-            f"repair.horizon is {wanted:g} s, but the conflict is at {conflict.time:g} s: a repair has to reach beyond it"
+            f"repair.horizon is {wanted:g} s, but the conflict is at {conflict.time:g} s: "
+            "a repair has to reach beyond it"
         )
     t_end = min(wanted, t_reference)
     t_end = max(np.floor(t_end / scene.dt + 1e-6) * scene.dt, min(scene.dt, t_reference))
@@ -283,7 +286,9 @@ def repair(
     return search(prepared, backend, on_probe=on_probe, phases=phases.seconds)
 
 
-def search(prepared: Prepared, backend: Any, *, on_probe: Any = None, phases: dict[str, float] | None = None) -> RepairResult:
+def search(
+    prepared: Prepared, backend: Any, *, on_probe: Any = None, phases: dict[str, float] | None = None
+) -> RepairResult:
     """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, one repair at the TTR)."""
     timed = _Phases(dict(phases or {}))
     timed.seconds.update(prepared.phases)

@@ -53,7 +53,9 @@ def bernstein_matrix(degree: int) -> Array:
     Both sets span the same polynomial; the Bernstein hull is the tighter one.
     """
     p = degree
-    to_bernstein = np.array([[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)])
+    to_bernstein = np.array(
+        [[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)]
+    )
     return frozen(to_bernstein @ segment_matrix(p))
 
 

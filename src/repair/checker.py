@@ -194,8 +194,14 @@ class Checker:
         checks = (
             (reached.min_speed < -STANDSTILL, f"reverses at {-reached.min_speed:.2f} m/s"),
             (reached.max_speed > limits.v_max * (1 + SLACK) + 0.1, f"speed {reached.max_speed:.1f} m/s"),
-            (reached.min_acceleration < limits.a_min * (1 + SLACK), f"brakes at {reached.min_acceleration:.2f} m/s²"),
-            (reached.max_acceleration > limits.a_max * (1 + SLACK), f"accelerates at {reached.max_acceleration:.2f}"),
+            (
+                reached.min_acceleration < limits.a_min * (1 + SLACK),
+                f"brakes at {reached.min_acceleration:.2f} m/s²",
+            ),
+            (
+                reached.max_acceleration > limits.a_max * (1 + SLACK),
+                f"accelerates at {reached.max_acceleration:.2f}",
+            ),
             (
                 reached.max_lateral_acceleration > limits.a_lat * (1 + SLACK),
                 f"lateral acceleration {reached.max_lateral_acceleration:.2f} m/s²",

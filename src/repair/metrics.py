@@ -35,8 +35,8 @@ def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Pea
     the rate of the heading, both by differences over the dense, equally spaced samples.
     """
     if len(path.t) < 3:
-        zero = np.zeros(len(path.t))
-        longitudinal, lateral = zero, zero
+        longitudinal: Array = np.zeros(len(path.t))
+        lateral = longitudinal
     else:
         step = path.t[1] - path.t[0]
         longitudinal = _rate(path.speed, step)

@@ -54,8 +54,8 @@ def build_occupancy(
     inflate = np.array([s_offset, l_offset])
     for k, obstacle in enumerate(obstacles):
         points = projected[k]
-        known = np.isfinite(points).all(axis=-1)
-        present = np.isfinite(obstacle.vertices).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(points).all(axis=-1))
+        present = np.asarray(np.isfinite(obstacle.vertices).all(axis=(1, 2)))
         seen = known.any(axis=1) & present
         if seen.any():
             masked = np.where(known[seen][..., None], points[seen], np.nan)
@@ -86,7 +86,9 @@ def _project_all(obstacles: Sequence[Obstacle], frame: FrenetFrame) -> list[Arra
     return [part.reshape(shape) for part, shape in zip(np.split(result, sizes), shapes, strict=True)]
 
 
-def shrink_to_start(occupancy: Occupancy, start: Array, touching: set[int]) -> tuple[Occupancy, tuple[str, ...]]:
+def shrink_to_start(
+    occupancy: Occupancy, start: Array, touching: set[int]
+) -> tuple[Occupancy, tuple[str, ...]]:
     """Take back so much of the margin of an obstacle that the ego does not start inside of it.
 
     A start within the margin but without contact is not a collision yet; without this, nothing
@@ -134,7 +136,7 @@ def first_entry(occupancy: Occupancy, trajectory: FrenetTrajectory) -> tuple[int
     if not len(occupancy):
         return None
     lower, upper = occupancy.at(trajectory.t)
-    inside = ((lower < trajectory.position) & (trajectory.position < upper)).all(axis=2)
+    inside = np.asarray(((lower < trajectory.position) & (trajectory.position < upper)).all(axis=2))
     hit = inside.any(axis=0)
     if not hit.any():
         return None
@@ -142,7 +144,9 @@ def first_entry(occupancy: Occupancy, trajectory: FrenetTrajectory) -> tuple[int
     return sample, int(np.argmax(inside[:, sample]))
 
 
-def relevant(occupancy: Occupancy, start: Array, t_start: float, t_end: float, reach: Array, l_room: Array) -> Occupancy:
+def relevant(
+    occupancy: Occupancy, start: Array, t_start: float, t_end: float, reach: Array, l_room: Array
+) -> Occupancy:
     """The obstacles that the ego could touch between two times.
 
     Parameters

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.types import (
     Array,
@@ -143,7 +144,9 @@ def _lateral_profiles(
         # Peak acceleration of a quintic lane change is 10/sqrt(3) shift / T**2.
         shortest = max(np.sqrt(5.8 * shift / (0.9 * limits.a_lat)), 1.9 * shift / limits.v_lat, 0.3)
         available = float(tau[k])
-        for duration in sorted({shortest, max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))}):
+        for duration in sorted(
+            {shortest, max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))}
+        ):
             position, rate, acceleration = _quintic(start[:, 1], target, duration, tau)
             cost = float(np.mean(acceleration**2)) + 0.1
             profiles.append(_LateralProfile(maneuver, position, rate, acceleration, cost))
@@ -195,7 +198,9 @@ def open_passings(
     speeds = _speed_profiles(start, tau, limits)
     # Braking in a bend is bound by the friction circle; a guide leaves a tenth of it.
     bend = np.abs(speeds.v**2 * np.interp(speeds.s, *curvature))
-    excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat).max(axis=1)
+    excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat).max(
+        axis=1
+    )
     excess = np.maximum(excess, 0.0)
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
     closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
@@ -218,7 +223,7 @@ def open_passings(
                 p = int(np.argmin(badness))
                 if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
                     closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
-    wanted = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
+    wanted: list[Maneuver | None] = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
     if not best:
         wanted += [Maneuver.LEFT, Maneuver.RIGHT]
     for kind in wanted:
@@ -235,11 +240,11 @@ def open_passings(
 def _kinds(
     profile: _LateralProfile,
     conflict: tuple[int, int] | None,
-    overlap: Array,
-    met: Array,
+    overlap: npt.NDArray[np.bool_],
+    met: npt.NDArray[np.intp],
     ahead: Array,
     speeds: _Rollouts,
-) -> dict[Maneuver, Array]:
+) -> dict[Maneuver, npt.NDArray[np.bool_]]:
     """Which speed profiles (P,) count as which manoeuvre."""
     if profile.maneuver is not None or conflict is None:
         return {profile.maneuver or Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
@@ -271,7 +276,7 @@ def _passing(
     return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost)
 
 
-def sides_of(position: Array, lower: Array, upper: Array) -> np.ndarray:
+def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8]:
     """Side (N, K) that a collision-free path (K, 2) takes of each box.
 
     Where the path is clear on one axis only, that axis decides; where it is clear on both, the
@@ -286,6 +291,6 @@ def sides_of(position: Array, lower: Array, upper: Array) -> np.ndarray:
         ]
     )
     present = np.isfinite(room).all(axis=0)
-    side = np.argmax(np.where(present, room, -np.inf), axis=0).astype(np.int8)
+    side: npt.NDArray[np.int8] = np.argmax(np.where(present, room, -np.inf), axis=0).astype(np.int8)
     assert (Side.BEHIND, Side.AHEAD, Side.LEFT, Side.RIGHT) == (0, 1, 2, 3)
     return side

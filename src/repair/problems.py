@@ -150,9 +150,10 @@ class ProblemFactory:
         ahead = s0 + v0 * duration + 0.5 * self.limits.a_max * duration**2
         reach = np.array([s0 - 1.0, ahead + 1.0])
         if lateral:
-            right, left = self.bounds.at(np.linspace(*reach, 50))
+            right, left = self.bounds.at(np.linspace(reach[0], reach[1], 50))
             room = np.array([right.min(), left.max()])
         else:
             room = np.array([reference[:, 1].min(), reference[:, 1].max()])
         margin = self.config.repair.margin + self.config.repair.clearance
-        return relevant(self.occupancy, start, t_rep, self.t_end, reach, room + [-margin, margin])
+        room += np.array([-margin, margin])
+        return relevant(self.occupancy, start, t_rep, self.t_end, reach, room)

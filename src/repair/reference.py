@@ -65,7 +65,9 @@ class SpeedProfile:
         return float(self.knots[-1])
 
     @classmethod
-    def from_accelerations(cls, s0: float, v0: float, durations: Sequence[float], a: Sequence[float]) -> SpeedProfile:
+    def from_accelerations(
+        cls, s0: float, v0: float, durations: Sequence[float], a: Sequence[float]
+    ) -> SpeedProfile:
         """Chain pieces of constant acceleration from t = 0; after the last one the speed is held."""
         knots, s, v = [0.0], [s0], [v0]
         for duration, rate in zip(durations, a, strict=True):
@@ -190,8 +192,9 @@ def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> U
     edges = lattice.n_speeds * lattice.n_positions * len(lattice.changes) * max(n_layers, 10)
     if edges > _GRID_MAX:
         raise ConfigError(
-            f"{scene.id}: the reference planner would look at {edges:.1g} edges, at most {_GRID_MAX:.0g}; choose a larger "
-            f"reference.speed_step ({config.speed_step:g} m/s) or reference.time_step ({config.time_step:g} s)"
+            f"{scene.id}: the reference planner would look at {edges:.1g} edges, at most {_GRID_MAX:.0g}; "
+            f"choose a larger reference.speed_step ({config.speed_step:g} m/s) "
+            f"or reference.time_step ({config.time_step:g} s)"
         )
     positions = s0 + lattice.unit * np.arange(lattice.n_positions)
     node_cost = _node_cost(scene, config, lattice, positions, desired)
@@ -207,7 +210,9 @@ def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> U
     return _smooth(profile, scene, n_layers * config.time_step)
 
 
-def _node_cost(scene: Scene, config: ReferenceConfig, lattice: _Lattice, positions: Array, desired: float) -> Array:
+def _node_cost(
+    scene: Scene, config: ReferenceConfig, lattice: _Lattice, positions: Array, desired: float
+) -> Array:
     """Cost (V, S) of being at a speed in a place: lost progress, lateral discomfort, speeding.
 
     Progress is measured against one desired speed everywhere: a wish that falls with the curvature
@@ -293,7 +298,9 @@ def _smooth(profile: SpeedProfile, scene: Scene, duration: float) -> UniformBSpl
     head = splice_points(scene.start, degree, spacing)
     head[:, 1] = 0.0
     left = np.vstack([basis_matrix(tau, n, degree, spacing), _JERK * derivative_matrix(n, 3, spacing)])
-    right = np.concatenate([profile.sample(tau).position[:, 0], np.zeros(n - 3)]) - left[:, :degree] @ head[:, 0]
+    right = (
+        np.concatenate([profile.sample(tau).position[:, 0], np.zeros(n - 3)]) - left[:, :degree] @ head[:, 0]
+    )
     tail = np.linalg.lstsq(left[:, degree:], right, rcond=None)[0]
     points = np.zeros((n, 2))
     points[:, 0] = np.concatenate([head[:, 0], tail])
@@ -313,7 +320,9 @@ def _recorded(scene: Scene, obstacle_id: int | None) -> tuple[Array, str]:
     else:
         found = [o for o in (*scene.obstacles, scene.recorded_ego) if o is not None and o.id == obstacle_id]
         if not found:
-            raise ReferenceTrajectoryError(f"{scene.id}: there is no obstacle {obstacle_id} to take the reference from")
+            raise ReferenceTrajectoryError(
+                f"{scene.id}: there is no obstacle {obstacle_id} to take the reference from"
+            )
         obstacle = found[0]
     return obstacle.states[:, :2], f"obstacle {obstacle.id}"
 
@@ -333,12 +342,18 @@ def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
         raise ReferenceTrajectoryError(f"solution file {error}") from error
     except Exception as error:  # commonroad-io raises whatever the broken part happens to cause
         first = (str(error).splitlines() or [""])[0]
-        raise ReferenceTrajectoryError(f"{path} is not a CommonRoad solution file: {type(error).__name__} {first}") from error
+        raise ReferenceTrajectoryError(
+            f"{path} is not a CommonRoad solution file: {type(error).__name__} {first}"
+        ) from error
     if str(solution.scenario_id) not in (scene.id, str(scene.scenario.scenario_id)):
         raise ReferenceTrajectoryError(f"{path} is a solution for {solution.scenario_id}, not for {scene.id}")
-    matching = [s for s in solution.planning_problem_solutions if s.planning_problem_id == scene.planning_problem_id]
+    matching = [
+        s for s in solution.planning_problem_solutions if s.planning_problem_id == scene.planning_problem_id
+    ]
     if not matching:
-        raise ReferenceTrajectoryError(f"{path} holds no solution for planning problem {scene.planning_problem_id}")
+        raise ReferenceTrajectoryError(
+            f"{path} holds no solution for planning problem {scene.planning_problem_id}"
+        )
     return _positions(scene, matching[0], path), str(path)
 
 
@@ -359,7 +374,7 @@ def _positions(scene: Scene, solution: Any, path: Path) -> Array:
 
 def known_until(positions: Array) -> int:
     """Number of leading positions (T, 2) without a gap."""
-    known = np.isfinite(positions).all(axis=1)
+    known = np.asarray(np.isfinite(positions).all(axis=1))
     return len(known) if known.all() else int(np.argmin(known))
 
 
@@ -367,10 +382,14 @@ def _fit_positions(scene: Scene, positions: Array, what: str) -> UniformBSpline:
     """Spline through recorded centre positions (T, 2), as far as they go without a gap."""
     last = known_until(positions)
     if last < 4:
-        raise ReferenceTrajectoryError(f"{scene.id}: {what} is known for {last} steps only; a reference takes at least 4")
+        raise ReferenceTrajectoryError(
+            f"{scene.id}: {what} is known for {last} steps only; a reference takes at least 4"
+        )
     coordinates = scene.frame.to_frenet(positions[:last])
     if not np.isfinite(coordinates).all():
-        raise ReferenceTrajectoryError(f"{scene.id}: {what} leaves the neighbourhood of the route and cannot be a reference")
+        raise ReferenceTrajectoryError(
+            f"{scene.id}: {what} leaves the neighbourhood of the route and cannot be a reference"
+        )
     degree = 3
     spacing = max(0.4, 2.0 * scene.dt)
     duration = (last - 1) * scene.dt

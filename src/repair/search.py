@@ -88,7 +88,11 @@ def _as_printed(end: float, delta_t: float) -> Order:
         t_rep = 0.5 * (start + end)
 
 
-_RULES: dict[str, Callable[[float, float], Order]] = {"bisect": _bisect, "scan": _scan, "as_printed": _as_printed}
+_RULES: dict[str, Callable[[float, float], Order]] = {
+    "bisect": _bisect,
+    "scan": _scan,
+    "as_printed": _as_printed,
+}
 
 
 def probe_order(rule: str, end: float, delta_t: float) -> Order:
@@ -167,7 +171,9 @@ def _unsolved(solve: SolveResult, t_rep: float) -> Verdict:
     return Verdict((Violation(reason, t_rep, solve.detail or solve.status.sentence),))
 
 
-def _relaxed(source: ProblemSource, backend: RepairBackend, t_rep: float) -> Iterator[Sequence[RepairProblem]]:
+def _relaxed(
+    source: ProblemSource, backend: RepairBackend, t_rep: float
+) -> Iterator[Sequence[RepairProblem]]:
     """Problems with smaller margins, for a backend that keeps its margin whatever it costs.
 
     Boxes in (s, l) are wider than the vehicles in them; a hard backend would call a repair infeasible

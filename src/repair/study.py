@@ -30,8 +30,8 @@ COLUMNS = (
     "file", "backend", "reference", "status", "detail", "conflict", "obstacle_id", "from_behind", "ttc_s",
     "contact_ttc_s", "f_ttr_s", "ttb_s", "ttr_s", "maneuver", "peak_deceleration_mps2",
     "peak_lateral_acceleration_mps2", "min_speed_mps", "largest_residual", "probes", "official_feasible",
-    "official_collision_free", "official_on_road", "road_method", "load_time_s", "prepare_time_s", "search_time_s",
-    "solve_time_s", "check_time_s", "official_time_s",
+    "official_collision_free", "official_on_road", "road_method", "load_time_s", "prepare_time_s",
+    "search_time_s", "solve_time_s", "check_time_s", "official_time_s",
 )  # fmt: skip
 
 
@@ -105,7 +105,9 @@ def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
     return rows
 
 
-def _row(file: str, scene: Any, backend: str, reference: str, settings: SweepSettings, loaded: float) -> dict[str, Any]:
+def _row(
+    file: str, scene: Any, backend: str, reference: str, settings: SweepSettings, loaded: float
+) -> dict[str, Any]:
     from repair.api import prepare, search
     from repair.baselines.evasive import evasive_ttr
     from repair.export import to_dict
@@ -134,7 +136,10 @@ def _row(file: str, scene: Any, backend: str, reference: str, settings: SweepSet
         ttb_s=_text(evasive.ttb),
         ttr_s=_text(evasive.ttr),
         largest_residual=max(best.solve.residuals.values(), default=None) if best is not None else None,
-        probes=" ".join(f"{p.t_rep:g}:{'+' if p.feasible else '-'.join(('', *p.verdict.reasons))}" for p in result.search.probes),
+        probes=" ".join(
+            f"{p.t_rep:g}:{'+' if p.feasible else '-'.join(('', *p.verdict.reasons))}"
+            for p in result.search.probes
+        ),
         load_time_s=round(loaded, 4),
         prepare_time_s=round(prepared_in, 4),
         **{f"{name}_time_s": round(result.phases[name], 5) for name in ("search", "solve", "check")},
@@ -268,7 +273,11 @@ def sweep(folder: Path, settings: SweepSettings, *, progress: bool | None = None
                     name = files[worker.task].name
                     if isinstance(answer, str):
                         status = "timeout" if answer.startswith("no answer") else "crash"
-                        answer = [_failed(name, b, r, status, answer_text) for b, r in _combinations(settings) for answer_text in (answer,)]
+                        answer = [
+                            _failed(name, b, r, status, answer_text)
+                            for b, r in _combinations(settings)
+                            for answer_text in (answer,)
+                        ]
                     rows[worker.task] = answer
                     bar.update()
                     _next(worker, waiting, files)
@@ -285,7 +294,9 @@ def _next(worker: _Worker, waiting: Iterable[int], files: Sequence[Path]) -> Non
         return
 
 
-def write_sweep(rows: list[dict[str, Any]], folder: Path, settings: SweepSettings, source: Path) -> list[Path]:
+def write_sweep(
+    rows: list[dict[str, Any]], folder: Path, settings: SweepSettings, source: Path
+) -> list[Path]:
     """Write ``sweep.csv`` and ``sweep.json`` (rows, settings, checksums of the files)."""
     from repair.export import to_json, write_files
 
@@ -304,4 +315,6 @@ def write_sweep(rows: list[dict[str, Any]], folder: Path, settings: SweepSetting
         "rows": rows,
     }
     json.dumps(content, allow_nan=False)
-    return write_files(folder, {"sweep.csv": table.getvalue().encode(), "sweep.json": to_json(content).encode()})
+    return write_files(
+        folder, {"sweep.csv": table.getvalue().encode(), "sweep.json": to_json(content).encode()}
+    )

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+#: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
+Array = npt.NDArray[np.floating[Any]]
 
 __all__ = [
     "Array",
@@ -83,10 +84,14 @@ class Curve(Protocol):
     """A trajectory that can be evaluated at any time of its span (a spline, a Bernstein chain)."""
 
     @property
-    def t_start(self) -> float: ...
+    def t_start(self) -> float:
+        """Start of the span [s]."""
+        ...
 
     @property
-    def t_end(self) -> float: ...
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        ...
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate at the times ``t`` (K,); outside the span the curve is extended from its end state."""

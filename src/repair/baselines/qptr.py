@@ -137,7 +137,8 @@ class QptrBackend:
         return _Axis(structure, origin, rows, limit, offset, broken)
 
     def _curve(self, problem: RepairProblem, axes: list[_Axis], z: Array) -> BernsteinCurve:
-        structure, columns, used = axes[0].structure, [], 0
+        structure, used = axes[0].structure, 0
+        columns: list[Array] = []
         for axis in axes:
             m = len(axis.origin)
             columns.append(axis.offset + axis.structure.basis @ z[used : used + m])

@@ -18,8 +18,8 @@ from repair.scene.frame import FrenetFrame
 from repair.scene.lead_in import drive_path
 from repair.scene.obstacles import Obstacle, last_predicted_step, obstacles_of
 from repair.scene.route import Lane, Route, goal_areas, lanes_of, plan_route
-from repair.scene.vehicle import Vehicle, load_vehicle
 from repair.scene.shapes import FAR
+from repair.scene.vehicle import Vehicle, load_vehicle
 from repair.types import Array, LateralBounds, frozen
 
 __all__ = ["InitialState", "Scene", "SpeedLimit", "load_scene", "scene_from_scenario"]
@@ -276,7 +276,9 @@ def _initial_state(state: Any) -> InitialState:
         raise ScenarioError("the planning problem's initial state is not finite")
     made = InitialState(*numbers)
     if max(abs(made.x), abs(made.y)) > FAR:
-        raise ScenarioError(f"the ego's initial position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out")
+        raise ScenarioError(
+            f"the ego's initial position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out"
+        )
     if not _SPEED[0] <= made.velocity <= _SPEED[1]:
         raise ScenarioError(
             f"the ego's initial speed is {made.velocity:g} m/s; it has to be from 0 to {_SPEED[1]:g} m/s"
@@ -306,9 +308,10 @@ def _steps_considered(
         open_ended = after != "remove" and horizon is not None
         return limit if open_ended else min(last - first, limit)
     times = [getattr(state, "time_step", None) for state in problem.goal.state_list]
-    ends = [float(getattr(t, "end", t)) - first for t in times if t is not None]
-    ends = [e for e in ends if np.isfinite(e) and e > 0]
-    return min(int(max(ends)) if ends else round(_HORIZON_DEFAULT / dt), limit)
+    # the smaller one first: a file may hold integers that no float can
+    ends = [min(limit, getattr(t, "end", t) - first) for t in times if t is not None]
+    ends = [int(e) for e in ends if e >= 1]
+    return max(ends) if ends else min(max(round(_HORIZON_DEFAULT / dt), 1), limit)
 
 
 def _is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehicle) -> bool:

@@ -172,7 +172,7 @@ def drive_path(
     curvature = float(np.clip(frame.curvature(s0) / (1.0 - frame.curvature(s0) * l0), -limit, limit))
     direction = orientation + float(np.arcsin(vehicle.rear * curvature))
     error = _wrapped(direction - float(frame.heading(s0)))
-    turn = np.empty((0, 2))
+    turn: Array = np.empty((0, 2))
     if abs(error) > _STEEP:
         notes.append(
             f"the ego starts {np.rad2deg(error):.0f} degrees off its route and first turns towards it"

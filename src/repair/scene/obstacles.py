@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -144,9 +145,9 @@ def _state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Pl
 
 
 def _steps(value: Any) -> tuple[int, int]:
-    low, high = interval(value)
-    if not max(abs(low), abs(high)) <= _STEPS_MAX:
-        raise ScenarioError(f"a time step of an obstacle is {low:g}" if low == high else f"time steps go from {low:g} to {high:g}")
+    low, high = getattr(value, "start", value), getattr(value, "end", value)
+    if not (abs(low) <= _STEPS_MAX and abs(high) <= _STEPS_MAX):
+        raise ScenarioError(f"a time step of an obstacle is beyond {_STEPS_MAX}")
     return int(np.floor(low)), int(np.ceil(high))
 
 
@@ -161,6 +162,8 @@ def _timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], 
     placed: dict[int, Placed] = {}
     states: dict[int, Any] = {}
     if initial is not None:
+        if hasattr(initial.time_step, "start"):
+            raise ScenarioError("the time step of its initial state is an interval")
         states[_steps(initial.time_step)[0]] = initial
     if trajectory is not None:
         _check_order([_steps(s.time_step) for s in trajectory.state_list], states)
@@ -196,8 +199,10 @@ def _check_order(steps: Sequence[tuple[int, int]], initial: Iterable[int]) -> No
     """Time steps of a prediction: from the initial one on, in order, without a hole."""
     before = list(initial)[:1]
     if before and steps and steps[0][0] > before[0] + 1:
-        raise ScenarioError(f"its prediction starts at time step {steps[0][0]}, its initial state at {before[0]}")
-    for (low, high), (following, _) in zip(steps, steps[1:], strict=False):
+        raise ScenarioError(
+            f"its prediction starts at time step {steps[0][0]}, its initial state at {before[0]}"
+        )
+    for (low, high), (following, _) in pairwise(steps):
         if not low < following <= high + 1:
             raise ScenarioError(f"its prediction goes from time step {high} to {following}")
 

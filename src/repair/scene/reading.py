@@ -168,7 +168,8 @@ def _check_elements(data: bytes, name: str) -> tuple[str, ...]:
         missing = [c for c in _NEEDED.get(tag, ()) if state is not None and state.find(c) is None]
         if missing:
             raise ScenarioError(
-                f"{name}: the initial state of {owner.tag} {owner.get('id')} has no {' and no '.join(missing)}"
+                f"{name}: the initial state of {owner.tag} {owner.get('id')} "
+                f"has no {' and no '.join(missing)}"
             )
     unknown = sorted({str(e.tag) for e in root} - _KNOWN)
     return (f"elements that are not CommonRoad's are ignored: {', '.join(unknown)}",) if unknown else ()

@@ -148,7 +148,7 @@ def goal_areas(goal: Any) -> list[Any]:
     Raises
     ------
     ScenarioError
-        If one has a number that is not finite.
+        If one has a vertex that is not finite or out of the world.
     """
     found = []
     for state in goal.state_list:
@@ -157,8 +157,8 @@ def goal_areas(goal: Any) -> list[Any]:
         for shape in getattr(state.position, "shapes", [state.position]):
             if not hasattr(type(shape), "shapely_object"):  # a point
                 continue
-            if not np.isfinite(getattr(shape, "vertices", shape.center)).all():
-                raise ScenarioError("the goal region has a vertex that is not finite")
+            if not (np.abs(getattr(shape, "vertices", shape.center)) <= FAR).all():
+                raise ScenarioError(f"the goal region has a vertex that is not finite or farther than {FAR:g} m out")
             found.append(shape.shapely_object)
     return found
 

@@ -10,11 +10,13 @@ identity (a Cholesky preconditioner), which changes the path of L-BFGS and not i
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.bspline import UniformBSpline, basis_matrix, derivative_matrix, fit_to_curve, n_points_for
 from repair.config import Config, EgoConfig
@@ -60,7 +62,7 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
     one passed on the left or right those inside its longitudinal interval.
     """
     n = len(times)
-    parts: list[tuple[Array, Array, Array, Array, Array]] = []
+    parts: list[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array, Array, Array]] = []
     passing = problem.passing
     if passing is not None and len(problem.occupancy):
         lower, upper = problem.occupancy.at(times)
@@ -121,7 +123,9 @@ def _smoothness(n: int, spacing: float, weight: float) -> Array:
 
 
 @lru_cache(maxsize=128)
-def _deformation_structure(n: int, degree: int, spacing: float, weight: float, precondition: bool) -> _Quadratic:
+def _deformation_structure(
+    n: int, degree: int, spacing: float, weight: float, precondition: bool
+) -> _Quadratic:
     hessian, stack = _smoothness(n, spacing, weight), _stack(n, spacing)
     block = hessian[degree:, degree:]
     # The straight line that the fixed points begin is the minimiser.
@@ -137,7 +141,9 @@ def _deformation_structure(n: int, degree: int, spacing: float, weight: float, p
 @lru_cache(maxsize=128)
 def _feasibility(n: int, limits: Limits, config: tuple[float, ...], scale: float) -> Feasibility:
     w_v, w_a, w_j, elastic, joint, reverse = config
-    maxima = np.array([[limits.v_max, limits.v_lat], [limits.a_max, limits.a_lat], [limits.j_lon, limits.j_lat]])
+    maxima = np.array(
+        [[limits.v_max, limits.v_lat], [limits.a_max, limits.a_lat], [limits.j_lon, limits.j_lat]]
+    )
     minima = np.array([[0.0, -limits.v_lat], [limits.a_min, -limits.a_lat], [-limits.j_lon, -limits.j_lat]])
     weights = (scale * w_v, scale * w_a, scale * w_j)
     return feasibility_bounds(n, maxima, minima, weights, elastic, joint, reverse)
@@ -218,7 +224,9 @@ class EgoBackend:
         try:
             deformed, pairs, feasibility, rounds = self._deform(problem, initial, deadline)
             refined = self._refine(problem, initial, deformed, feasibility, deadline)
-            if self.config.guard and _closest(pairs, refined.points) < min(0.0, _closest(pairs, deformed.points)):
+            if self.config.guard and _closest(pairs, refined.points) < min(
+                0.0, _closest(pairs, deformed.points)
+            ):
                 refined = deformed
         except _OutOfTime:
             now = time.perf_counter()
@@ -227,7 +235,9 @@ class EgoBackend:
                 detail=f"time limit of {time_limit:g} s",
             )  # fmt: skip
         curves = {
-            name: UniformBSpline(problem.t_rep, self.spacing, self.degree, _standing(minimum.points, self.degree))
+            name: UniformBSpline(
+                problem.t_rep, self.spacing, self.degree, _standing(minimum.points, self.degree)
+            )
             for name, minimum in (("deformation", deformed), ("refinement", refined))
         }
         converged = deformed.converged and refined.converged
@@ -254,7 +264,9 @@ class EgoBackend:
         shape = self._led_points(problem, initial)
         points = initial.points
         led = shape
-        for round_ in range(config.rebounds + 1):
+        rounds = 0
+        for _ in range(config.rebounds + 1):
+            rounds += 1
             feasibility, cap = self._bounds(problem, led)
             pairs = anchor_pairs(problem, initial.greville, shape, self.degree)
             minimum = self._minimise_deformation(
@@ -268,7 +280,7 @@ class EgoBackend:
                 break
             if not clear:
                 collision *= 2.0
-        return minimum, pairs, feasibility, round_ + 1
+        return minimum, pairs, feasibility, rounds
 
     def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
         """Where the guide leads the control points (the reference where there is no guide)."""
@@ -290,7 +302,9 @@ class EgoBackend:
         deadline: float | None,
     ) -> _Minimum:
         config, n = self.config, len(initial.points)
-        cached = _deformation_structure(n, self.degree, self.spacing, config.deform.smooth, config.precondition)
+        cached = _deformation_structure(
+            n, self.degree, self.spacing, config.deform.smooth, config.precondition
+        )
         head = initial.points[: self.degree]
         base = np.vstack([head, cached.centre @ head])
         if not problem.lateral:
@@ -316,7 +330,9 @@ class EgoBackend:
         upper[: n - 1, 0] = np.minimum(upper[: n - 1, 0], cap)
         return (replace(deform, upper=upper), replace(refine, upper=upper)), cap
 
-    def _lbfgs(self, cost: _Cost, y0: Array) -> tuple[Array, float, int, bool]:
+    def _lbfgs(
+        self, cost: Callable[[Array], tuple[float, Array]], y0: Array
+    ) -> tuple[Array, float, int, bool]:
         from scipy.optimize import fmin_l_bfgs_b
 
         config = self.config
@@ -347,7 +363,13 @@ class EgoBackend:
         if feasibility[1].evaluate(_stack(n, self.spacing) @ points)[1] is None:
             return _Minimum(points, terms.constant + 0.5 * float(terms.slope @ move), 0, True)
         cost = _RefineCost(
-            deformed.points, terms, feasibility[1], _stack(n, self.spacing), p, self.config.precondition, deadline
+            deformed.points,
+            terms,
+            feasibility[1],
+            _stack(n, self.spacing),
+            p,
+            self.config.precondition,
+            deadline,
         )
         y, value, iterations, converged = self._lbfgs(cost, cost.origin)
         return _Minimum(cost.points(y), value, iterations, converged)
@@ -391,7 +413,9 @@ class _Cost:
         # d = s_f - excess of every pair is affine in y: excess = offset - rows @ y.
         m = len(base) - cached.degree
         rows = np.zeros((len(pairs.row), m, axes))
-        rows[np.arange(len(pairs.row)), :, pairs.axis] = pairs.sign[:, None] * cached.w[pairs.row - cached.degree]
+        rows[np.arange(len(pairs.row)), :, pairs.axis] = (
+            pairs.sign[:, None] * cached.w[pairs.row - cached.degree]
+        )
         self.rows = rows.reshape(len(pairs.row), m * axes)
         self.offset = pairs.threshold - pairs.sign * (base[pairs.row, pairs.axis] - pairs.anchor)
 

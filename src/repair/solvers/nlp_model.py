@@ -255,7 +255,7 @@ def _deadline_callback(nlp: dict[str, Any]) -> _Deadline:
     sizes = {"x": nlp["x"].numel(), "f": 1, "g": nlp["g"].numel(), "lam_x": nlp["x"].numel(),
              "lam_g": nlp["g"].numel(), "lam_p": nlp["p"].numel()}  # fmt: skip
 
-    class Watch(ca.Callback):  # type: ignore[misc]
+    class Watch(ca.Callback):
         def __init__(self) -> None:
             ca.Callback.__init__(self)
             self.construct("watch", {})

@@ -178,9 +178,9 @@ class Layout:
         self.gauss_tau = tau
         basis = [basis_matrix(tau, s.n, s.degree, s.spacing, k) for k in range(4)]
         w_acceleration, w_jerk, w_reference = s.weights
-        self.hessian = 2.0 * sum(
-            w * basis[k].T @ (weight[:, None] * basis[k])
-            for w, k in ((w_acceleration, 2), (w_jerk, 3), (w_reference, 0))
+        parts = ((w_acceleration, 2), (w_jerk, 3), (w_reference, 0))
+        self.hessian: Array = np.asarray(
+            2.0 * sum(w * basis[k].T @ (weight[:, None] * basis[k]) for w, k in parts)
         )
         self.reference_weight = 2.0 * w_reference * weight
         self.pull = basis[0].T * self.reference_weight  # times the reference's positions at gauss_tau

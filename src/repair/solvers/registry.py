@@ -50,7 +50,7 @@ def backend_names() -> tuple[str, ...]:
 
 def available() -> dict[str, str | None]:
     """For each backend, None if it can be made, else the sentence that says what is missing."""
-    state: dict[str, str | None] = {name: None for name in _EXTRA}
+    state: dict[str, str | None] = dict.fromkeys(_EXTRA)
     for name, (module, _, packages, _) in _BACKENDS.items():
         state[name] = None
         for needed in (*packages, module):

@@ -219,7 +219,7 @@ def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[n
     score[:, 0][np.isfinite(start) & (start < min(problem.margin, 0.0) - _TOUCH)] = -np.inf
     if not problem.lateral:
         score[..., 2:] = -np.inf
-    return np.argmax(score, axis=2)
+    return np.asarray(np.argmax(score, axis=2))
 
 
 def _tighten(
