@@ -6,7 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-HEADER = 'timeStepSize="{dt}" commonRoadVersion="2020a" benchmarkID="{name}" author="" affiliation="" source="" date="2024-01-01"'
+HEADER = (
+    'timeStepSize="{dt}" commonRoadVersion="2020a" benchmarkID="{name}" '
+    'author="" affiliation="" source="" date="2024-01-01"'
+)
 
 
 def exact(tag: str, value: object) -> str:
@@ -18,8 +21,9 @@ def point(x: object, y: object) -> str:
 
 
 def state(
-    x: object, y: object, *, k: object = 0, heading: object = 0.0, v: object = 10.0, leave: Iterable[str] = (),
-    position: str | None = None, tag: str = "initialState", acceleration: object = 0.0,
+    x: object, y: object, *, k: object = 0, heading: object = 0.0, v: object = 10.0,
+    leave: Iterable[str] = (), position: str | None = None, tag: str = "initialState",
+    acceleration: object = 0.0,
 ) -> str:  # fmt: skip
     """One state; ``leave`` names elements to leave out, ``position`` replaces the exact point."""
     parts = {
@@ -36,7 +40,9 @@ def lanelet(name: int, x: Sequence[object], y: Sequence[float], *, width: float 
     """Along x; ``more``: successors and the like."""
     left = "".join(point(a, b + width / 2) for a, b in zip(x, y, strict=True))
     right = "".join(point(a, b - width / 2) for a, b in zip(x, y, strict=True))
-    return f'<lanelet id="{name}"><leftBound>{left}</leftBound><rightBound>{right}</rightBound>{more}</lanelet>'
+    return (
+        f'<lanelet id="{name}"><leftBound>{left}</leftBound><rightBound>{right}</rightBound>{more}</lanelet>'
+    )
 
 
 def car(name: int, start: str, prediction: str = "", *, shape: str | None = None) -> str:
@@ -45,14 +51,18 @@ def car(name: int, start: str, prediction: str = "", *, shape: str | None = None
     return f'<dynamicObstacle id="{name}">{body}</dynamicObstacle>'
 
 
-def driving(name: int, x: float, y: float, v: float, steps: Iterable[int] = range(1, 41), **keys: object) -> str:
+def driving(
+    name: int, x: float, y: float, v: float, steps: Iterable[int] = range(1, 41), **keys: object
+) -> str:
     """A car along x at constant speed."""
     states = "".join(state(x + 0.1 * k * v, y, k=k, v=v, tag="state", **keys) for k in steps)  # type: ignore[arg-type]
     return car(name, state(x, y, v=v), f"<trajectory>{states}</trajectory>")
 
 
 def problem(name: object = 100, start: str | None = None, goal: str | None = None) -> str:
-    goal = "<goalState><time><intervalStart>30</intervalStart><intervalEnd>40</intervalEnd></time></goalState>" if goal is None else goal  # fmt: skip
+    if goal is None:
+        time = "<time><intervalStart>30</intervalStart><intervalEnd>40</intervalEnd></time>"
+        goal = f"<goalState>{time}</goalState>"
     return f'<planningProblem id="{name}">{start or state(20.0, 0.0)}{goal}</planningProblem>'
 
 
@@ -66,8 +76,9 @@ def scenario(
 ) -> str:  # fmt: skip
     """A whole file: by default a straight road, a slower car ahead, one planning problem."""
     header = HEADER.format(dt=dt, name=name)
-    location = "<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude><gpsLongitude>999</gpsLongitude></location>"
-    content = f"{location}<scenarioTags/>{road}{obstacles}{problem() if problems is None else problems}"
+    place = "<geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude><gpsLongitude>999</gpsLongitude>"
+    head = f"<location>{place}</location><scenarioTags/>"
+    content = f"{head}{road}{obstacles}{problem() if problems is None else problems}"
     return f"<?xml version='1.0' encoding='UTF-8'?>{prolog}<commonRoad {header}>{content}</commonRoad>"
 
 

@@ -97,7 +97,7 @@ class DeformWeights:
 
     smooth: float = 1.0  # lambda_s
     collision: float = 1000.0  # lambda_c
-    feasible: float = 100.0  # lambda_d
+    feasible: float = 1000.0  # lambda_d
 
 
 @dataclass
@@ -105,7 +105,7 @@ class RefineWeights:
     """lambda_s, lambda_d, lambda_f."""
 
     smooth: float = 1.0  # lambda_s
-    feasible: float = 100.0  # lambda_d
+    feasible: float = 1000.0  # lambda_d
     fit: float = 1.0  # lambda_f
 
 

@@ -139,6 +139,7 @@ class ProblemFactory:
                 dt=step,
                 # Who keeps the path needs no sideways freedom, and without it the vehicle can be
                 # brought to a stop on any path that it can drive at all.
+                strict=not settings.relax,
                 lateral=lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings

@@ -279,6 +279,8 @@ class RepairProblem:
         The scenario's time step [s].
     lateral : bool
         Whether the backend may move sideways; if not, l stays on the reference.
+    strict : bool
+        No part of the margin may be given up, whatever the checker says of the true rectangles.
     """
 
     reference: Curve
@@ -295,6 +297,7 @@ class RepairProblem:
     curvature: Array
     dt: float
     lateral: bool = True
+    strict: bool = False
 
     def curvature_at(self, s: npt.ArrayLike) -> Array:
         """Curvature of the frame's axis [1/m] at ``s``."""

@@ -188,16 +188,17 @@ def sweep(arguments: argparse.Namespace) -> int:
     from repair.study import sweep as run_sweep
 
     settings = SweepSettings(
-        backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"], preset=arguments.preset,
-        overrides=arguments.overrides, official=not arguments.no_official, timeout=arguments.timeout,
-        jobs=arguments.jobs,
+        backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"],
+        preset=arguments.preset, overrides=arguments.overrides, official=not arguments.no_official,
+        timeout=arguments.timeout, jobs=arguments.jobs,
     )  # fmt: skip
     rows = run_sweep(arguments.folder, settings)
     if arguments.report is not None:
         from repair.files import write_files
         from repair.report.sweep import sweep_report
 
-        words = [f"--{k} {' '.join(v)}" for k, v in (("backend", settings.backends), ("reference", settings.references))]
+        chosen = (("backend", settings.backends), ("reference", settings.references))
+        words = [f"--{k} {' '.join(v)}" for k, v in chosen]
         text = sweep_report(rows, f"repair sweep {arguments.folder.name} {' '.join(words)}")
         print(*write_files(arguments.report.parent, {arguments.report.name: text.encode()}))
     if arguments.out is None and arguments.report is None:

@@ -209,3 +209,34 @@ def test_a_malformed_problem_raises():
         pytest.skip("casadi is not installed")
     with pytest.raises(BackendError, match="before it begins"):
         backend_of("casadi-ipopt").solve(replace(problems.static_block(), t_end=-1.0))
+
+
+def test_a_hard_backend_shows_the_curve_that_comes_closest():
+    """Boxes are wider than vehicles: what misses the margin by the least may still be free."""
+    problem = problems.too_near()
+    solve = backend_of("casadi-ipopt").solve(problem)
+    assert solve.status is SolveStatus.INFEASIBLE
+    assert solve.curve is None
+    assert solve.residuals["obstacles"] > 0.0
+    assert solve.stages["closest"].t_start == pytest.approx(problem.t_rep)
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_the_checker_may_accept_the_closest_curve_unless_the_problem_is_strict(strict):
+    problem = replace(problems.too_near(), strict=strict)
+
+    class Source:
+        def at(self, t_rep):
+            return (problem,)
+
+    class Lenient:
+        def check(self, problem, curve):
+            return Verdict()
+
+    conflict = Conflict(time=0.3, kind="margin", obstacle_id=1)
+    found = search_f_ttr(Source(), conflict, backend_of("casadi-ipopt"), Lenient(), SearchConfig())
+    if strict:
+        assert found.status is SearchStatus.NONE_FEASIBLE
+    else:
+        assert found.status is SearchStatus.FOUND
+        assert found.best.margin < problem.margin

@@ -1,4 +1,4 @@
-"""``python -m tests.fuzz --count 2000 --seed 0 --dir $COMMONROAD_SCENARIOS``; exit status 1 if anything broke."""
+"""``python -m tests.fuzz --count 2000 --seed 0 --dir $COMMONROAD_SCENARIOS``; status 1 if anything broke."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--count", type=int, default=2000, help="number of inputs")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--dir", type=Path, default=os.environ.get("COMMONROAD_SCENARIOS"), help="folder of CommonRoad files")
+    parser.add_argument(
+        "--dir", type=Path, default=os.environ.get("COMMONROAD_SCENARIOS"), help="folder of CommonRoad files"
+    )
     parser.add_argument("--limit", type=float, default=30.0, help="hard limit for one input [s]")
     parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     parser.add_argument("--only", type=int, nargs="+", help="run the inputs with these numbers only")
@@ -34,7 +36,11 @@ def main() -> int:
         nonlocal done
         done += 1
         if outcome.word == BUG or arguments.only:
-            print(f"{outcome.index} {outcome.name}: {outcome.word} {outcome.detail}", file=sys.stderr, flush=True)
+            print(
+                f"{outcome.index} {outcome.name}: {outcome.word} {outcome.detail}",
+                file=sys.stderr,
+                flush=True,
+            )
         if done % 100 == 0:
             print(f"{done} of {len(indices)}", file=sys.stderr, flush=True)
 

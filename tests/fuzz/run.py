@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from tests.fuzz import mutate
+from tests.fuzz import mutate, settings
 
 __all__ = ["Case", "Outcome", "Settings", "fuzz", "run_case", "scenario_files", "table"]
 
@@ -32,10 +32,10 @@ BUG = "BUG"
 CONFIGS = ("extremes", "types", "garbage")
 SOLUTIONS = ("generic", "generic", "bytes", "foreign")
 _SLOTS = (
-    *((("scenario: XML", name) for name in sorted(mutate.XML_MUTATIONS))),
-    *((("scenario: bytes", name) for name in sorted(mutate.BYTE_MUTATIONS))),
-    *((("configuration", name) for name in CONFIGS)),
-    *((("solution file", name) for name in SOLUTIONS)),
+    *(("scenario: XML", name) for name in sorted(mutate.XML_MUTATIONS)),
+    *(("scenario: bytes", name) for name in sorted(mutate.BYTE_MUTATIONS)),
+    *(("configuration", name) for name in CONFIGS),
+    *(("solution file", name) for name in SOLUTIONS),
 )
 _MEMORY = 8 << 30  # address space of a worker [bytes]
 
@@ -92,7 +92,7 @@ def make_case(index: int, settings: Settings, folder: Path) -> Case:
     overrides = ["search.time_limit=1.0"]
     if family == "configuration":
         config = folder / "settings.yaml"
-        config.write_bytes(mutate.config_text(rng, name))
+        config.write_bytes(settings.config_text(rng, name))
         return Case(family, name, small, tuple(overrides), config)
     if family == "solution file":
         path, (scenario, data) = folder / "solution.xml", _solution(settings.files)

@@ -1,4 +1,4 @@
-"""The same input gives the same result, byte for byte apart from times: in one process, in two, in a sweep."""
+"""The same input gives the same result, byte for byte but for times: in one process, in two, in a sweep."""
 
 from __future__ import annotations
 
@@ -75,9 +75,18 @@ def test_any_number_of_workers(files: list[Path], tmp_path: Path) -> None:
     for path in files:
         shutil.copy(path, tmp_path)
     rows = [
-        sweep(tmp_path, SweepSettings(official=False, jobs=jobs, references=("planner", "constant")), progress=False)
+        sweep(
+            tmp_path,
+            SweepSettings(official=False, jobs=jobs, references=("planner", "constant")),
+            progress=False,
+        )
         for jobs in (1, 2)
     ]
     assert len(rows[0]) == 2 * len(FILES)
     assert without_times(rows[0]) == without_times(rows[1])
-    assert {row["status"] for row in rows[0]} <= {"found", "no_conflict", "none_feasible", "already_colliding"}
+    assert {row["status"] for row in rows[0]} <= {
+        "found",
+        "no_conflict",
+        "none_feasible",
+        "already_colliding",
+    }

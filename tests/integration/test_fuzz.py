@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from tests.fuzz.run import BUG, Settings, fuzz, make_case, scenario_files, table
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.roads import ROAD, SLOW, car, driving, exact, lanelet, point, problem, scenario, state
 
 from repair.api import RepairResult, prepare, repair, search
 from repair.collision import official_shifts
@@ -18,7 +19,6 @@ from repair.errors import ConfigError, OutputError, ReferenceTrajectoryError, Re
 from repair.scene.commonroad import Scene, load_scene
 from repair.solvers.registry import make_backend
 from repair.types import SearchStatus
-from tests.roads import ROAD, SLOW, car, driving, exact, lanelet, point, problem, scenario, state
 
 CONFIG = load_config()
 
@@ -253,7 +253,7 @@ def test_time_step(refused: Any, dt: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("where", "number"),
+    "where, number",
     [
         (where, number)
         for where in ("lanelet", "ego", "heading", "speed", "obstacle", "prediction", "size")
@@ -262,13 +262,14 @@ def test_time_step(refused: Any, dt: str) -> None:
     ],
 )
 def test_numbers_that_are_none(refused: Any, where: str, number: str) -> None:
+    moved = f"<trajectory>{state(number, 0.0, k=1, tag='state')}</trajectory>"
     parts: dict[str, dict[str, str]] = {
         "lanelet": {"road": lanelet(1, [0, number, 400], [0.0] * 3)},
         "ego": {"problems": problem(start=state(number, 0.0))},
         "heading": {"problems": problem(start=state(20.0, 0.0, heading=number))},
         "speed": {"problems": problem(start=state(20.0, 0.0, v=number))},
         "obstacle": {"obstacles": car(30, state(number, 0.0))},
-        "prediction": {"obstacles": SLOW + car(31, state(9.0, 0.0), f"<trajectory>{state(number, 0.0, k=1, tag='state')}</trajectory>")},
+        "prediction": {"obstacles": SLOW + car(31, state(9.0, 0.0), moved)},
         "size": {"obstacles": car(30, state(45.0, 0.0), shape=f"<circle><radius>{number}</radius></circle>")},
     }  # fmt: skip
     refused(scenario(**parts[where]), ".")
@@ -292,20 +293,23 @@ def test_missing_yaw_in_a_prediction_is_the_direction_of_motion(load: Any) -> No
     across = "".join(
         state(60.0, -8.0 + k, k=k, tag="state", leave=["orientation", "acceleration"]) for k in range(1, 21)
     )
-    scene = load(scenario(obstacles=car(30, state(60.0, -8.0, heading=1.5708), f"<trajectory>{across}</trajectory>")))
+    scene = load(
+        scenario(obstacles=car(30, state(60.0, -8.0, heading=1.5708), f"<trajectory>{across}</trajectory>"))
+    )
     np.testing.assert_allclose(scene.obstacles[0].rectangles[:, 2], np.pi / 2, atol=1e-3)
 
 
 def test_speed_of_a_state_across_the_axes(load: Any) -> None:
     """commonroad-io derives a lateral speed that is along the y axis, not across the body."""
-    scene = load(scenario(obstacles=car(30, state(60.0, -8.0, heading=1.5708), "".join(
-        ["<trajectory>", *(state(60.0, -8.0 + k, k=k, heading=1.5708, tag="state") for k in range(1, 9)), "</trajectory>"]
-    ))))  # fmt: skip
+    across = "".join(state(60.0, -8.0 + k, k=k, heading=1.5708, tag="state") for k in range(1, 9))
+    start = state(60.0, -8.0, heading=1.5708)
+    scene = load(scenario(obstacles=car(30, start, f"<trajectory>{across}</trajectory>")))
     np.testing.assert_allclose(scene.obstacles[0].states[:, 3], 10.0)
 
 
 def test_uncertain_position_takes_the_larger_occupancy(load: Any) -> None:
-    area = f"<rectangle><length>3</length><width>1</width><orientation>0</orientation><center>{point(60, 0)[7:-8]}</center></rectangle>"
+    size = "<length>3</length><width>1</width><orientation>0</orientation>"
+    area = f"<rectangle>{size}<center>{point(60, 0)[7:-8]}</center></rectangle>"
     states = "".join(state(0, 0, k=k, position=area, tag="state") for k in range(1, 11))
     scene = load(scenario(obstacles=car(30, state(60.0, 0.0), f"<trajectory>{states}</trajectory>")))
     np.testing.assert_allclose(scene.obstacles[0].rectangles[1:, 3:], [[2.25 + 1.5, 0.9 + 0.5]] * 10)
@@ -333,10 +337,8 @@ def test_obstacle_without_prediction_stands(load: Any) -> None:
 def test_negative_time_steps(load: Any, refused: Any) -> None:
     refused(scenario(problems=problem(start=state(20.0, 0.0, k=-2))), "time step -2")
     refused(scenario(obstacles=driving(30, 45.0, 0.0, 2.0, range(-3, 9))), ".")
-    past = "".join(
-        f"<occupancy><shape><circle><radius>1</radius><center><x>60</x><y>0</y></center></circle></shape>{exact('time', k)}</occupancy>"
-        for k in range(-3, 6)
-    )
+    shape = "<shape><circle><radius>1</radius><center><x>60</x><y>0</y></center></circle></shape>"
+    past = "".join(f"<occupancy>{shape}{exact('time', k)}</occupancy>" for k in range(-3, 6))
     scene = load(scenario(obstacles=car(30, state(60.0, 0.0, k=-4), f"<occupancySet>{past}</occupancySet>")))
     assert np.isfinite(scene.obstacles[0].vertices).all()
 
@@ -353,7 +355,14 @@ def test_occupancy_over_an_endless_interval(load: Any) -> None:
 
 def test_time_steps_without_end(load: Any, refused: Any) -> None:
     endless = "9" * 400  # an integer for Python, and none for any float
-    refused(scenario(obstacles=car(30, state(60.0, 0.0, k=endless), f"<trajectory>{state(60, 0, k=1, tag='state')}</trajectory>")), "time step")
+    refused(
+        scenario(
+            obstacles=car(
+                30, state(60.0, 0.0, k=endless), f"<trajectory>{state(60, 0, k=1, tag='state')}</trajectory>"
+            )
+        ),
+        "time step",
+    )
     refused(scenario(problems=problem(start=state(20.0, 0.0, k=endless))), "time step")
     time = f"<time><intervalStart>1</intervalStart><intervalEnd>{endless}</intervalEnd></time>"
     scene = load(scenario(obstacles="", problems=problem(goal=f"<goalState>{time}</goalState>")))
@@ -361,7 +370,9 @@ def test_time_steps_without_end(load: Any, refused: Any) -> None:
 
 
 def test_uncertain_initial_time_step(refused: Any) -> None:
-    uncertain = SLOW.replace(exact("time", 0), "<time><intervalStart>0</intervalStart><intervalEnd>2</intervalEnd></time>")
+    uncertain = SLOW.replace(
+        exact("time", 0), "<time><intervalStart>0</intervalStart><intervalEnd>2</intervalEnd></time>"
+    )
     refused(scenario(obstacles=uncertain), "obstacle 30: the time step of its initial state")
 
 
@@ -429,7 +440,9 @@ def test_speed_that_cannot_be(refused: Any, speed: float) -> None:
 
 
 def test_unknown_elements_are_noted(load: Any) -> None:
-    scene = load(scenario(obstacles=SLOW + SLOW.replace("dynamicObstacle", "movingObstacle").replace("30", "31")))
+    scene = load(
+        scenario(obstacles=SLOW + SLOW.replace("dynamicObstacle", "movingObstacle").replace("30", "31"))
+    )
     assert "elements that are not CommonRoad's are ignored: movingObstacle" in scene.notes
 
 
@@ -446,15 +459,17 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> RepairResult:
 def test_solution_files(found: RepairResult, tmp_path: Path) -> None:
     written = found.save(tmp_path / "out", figure=False)
     good = next(p for p in written if p.suffix == ".xml").read_text(encoding="utf-8")
+    bomb = good.replace("<CommonRoadSolution", '<!DOCTYPE x [<!ENTITY a "b">]><CommonRoadSolution', 1)
+    holes = re.sub(r"<x>[\d.]+</x>", "<x>nan</x>", good, count=3)
     bad = {
         "other.xml": (good.replace("ZAM_Test-1_1_T-1", "ZAM_Test-2_1_T-1"), "ZAM_Test-2_1_T-1, not for"),
         "task.xml": (good.replace('planningProblem="100"', 'planningProblem="7"'), "planning problem 100"),
         "cut.xml": (good[: len(good) // 2], "not a CommonRoad solution file"),
         "road.xml": (scenario(), "not a CommonRoad solution file"),
-        "bomb.xml": (good.replace("<CommonRoadSolution", '<!DOCTYPE x [<!ENTITY a "b">]><CommonRoadSolution', 1), "DOCTYPE"),
+        "bomb.xml": (bomb, "DOCTYPE"),
         "nothing.xml": ("", "is empty"),
         "far.xml": (re.sub(r"<x>[\d.]+</x>", "<x>5000</x>", good), "4980 m from the ego"),
-        "nan.xml": (re.sub(r"<x>[\d.]+</x>", "<x>nan</x>", good, count=3), "no state at the planning problem"),
+        "nan.xml": (holes, "no state at the planning problem"),
     }  # fmt: skip
     for name, (text, sentence) in bad.items():
         path = tmp_path / name
@@ -472,13 +487,20 @@ def test_solution_files(found: RepairResult, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    "text, sentence",
     [
-        ("search: 3", "'search'"), ("search: {delta_t: [1]}", "'search.delta_t'"), ("- 1", "mapping"), ("search: {delt: 1}", "'search.delt'"),
-        ("scene: {vehicle: car}", "'scene.vehicle'"), ("search: {delta_t: .nan}", "'search.delta_t'"), ("a: ${", "."),
-        ("reference: {source: 7}", "'reference.source'"), ("\x00", "cannot be read"), ("[" * 3000, "cannot be read"),
+        ("search: 3", "'search'"),
+        ("search: {delta_t: [1]}", "'search.delta_t'"),
+        ("- 1", "mapping"),
+        ("search: {delt: 1}", "'search.delt'"),
+        ("scene: {vehicle: car}", "'scene.vehicle'"),
+        ("search: {delta_t: .nan}", "'search.delta_t'"),
+        ("a: ${", "."),
+        ("reference: {source: 7}", "'reference.source'"),
+        ("\x00", "cannot be read"),
+        ("[" * 3000, "cannot be read"),
     ],
-)  # fmt: skip
+)
 def test_configuration_of_the_wrong_type(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "settings.yaml"
     path.write_text(text, encoding="utf-8")
@@ -490,7 +512,10 @@ def test_settings_that_do_not_fit_the_scenario(found: RepairResult) -> None:
     with pytest.raises(ConfigError, match=r"repair\.horizon is 0\.5 s, but the conflict is at"):
         prepare(found.prepared.scene, load_config(overrides=["repair.horizon=0.5"]))
     with pytest.raises(ConfigError, match=r"reference\.speed_step"):
-        prepare(found.prepared.scene, load_config(overrides=["reference.speed_step=0.02", "reference.time_step=0.1"]))
+        prepare(
+            found.prepared.scene,
+            load_config(overrides=["reference.speed_step=0.02", "reference.time_step=0.1"]),
+        )
 
 
 def test_output_folder_below_a_file(found: RepairResult, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.roads import bend
 
 from repair.api import RepairResult, prepare, search
 from repair.config import Config, load_config
@@ -23,7 +24,6 @@ from repair.kinematics import official_check
 from repair.scene.commonroad import scene_from_scenario
 from repair.solvers.registry import make_backend
 from repair.types import SearchStatus
-from tests.roads import bend
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # protobuf's deprecations, on import
@@ -66,7 +66,9 @@ class Road:
 
     def network(self, lanes: int) -> LaneletNetwork:
         def lane(l: float, name: int, **keys: Any) -> Lanelet:  # noqa: E741
-            return Lanelet(self.offset(l + WIDTH / 2), self.offset(l), self.offset(l - WIDTH / 2), name, **keys)
+            return Lanelet(
+                self.offset(l + WIDTH / 2), self.offset(l), self.offset(l - WIDTH / 2), name, **keys
+            )
 
         beside = {"adjacent_left": 2, "adjacent_left_same_direction": True} if lanes > 1 else {}
         made = [lane(0.0, 1, **beside)]
@@ -74,12 +76,14 @@ class Road:
             made.append(lane(WIDTH, 2, adjacent_right=1, adjacent_right_same_direction=True))
         if lanes > 2:
             back = lane(2 * WIDTH, 3)
-            made.append(Lanelet(back.right_vertices[::-1], back.center_vertices[::-1], back.left_vertices[::-1], 3))
+            made.append(
+                Lanelet(back.right_vertices[::-1], back.center_vertices[::-1], back.left_vertices[::-1], 3)
+            )
         return LaneletNetwork.create_from_lanelet_list(made)
 
 
 class Thing:
-    """An obstacle at constant speed along or across the road, or standing; ``pose(k)`` at a fractional step."""
+    """An obstacle at constant speed along or across the road, or standing; ``body`` at a fractional step."""
 
     def __init__(self, name: int, road: Road, drawn: tuple[Any, ...], dt: float, steps: int) -> None:
         s, l, kind, speed, body, last, turn = drawn  # noqa: E741
@@ -152,18 +156,23 @@ things = st.tuples(
 @st.composite
 def cases(draw: st.DrawFn) -> tuple[Any, list[Thing], Config]:
     radius = draw(st.sampled_from([np.inf, np.inf, 200.0, -100.0, 60.0, -60.0, 30.0]))
-    line = np.stack([np.arange(0.0, 302.0, 2.0), np.zeros(151)], axis=1) if np.isinf(radius) else bend(radius, 30.0 + min(2.5 * abs(radius), 270.0))
+    straight = np.stack([np.arange(0.0, 302.0, 2.0), np.zeros(151)], axis=1)
+    line = straight if np.isinf(radius) else bend(radius, 30.0 + min(2.5 * abs(radius), 270.0))
     road, dt = Road(line), draw(st.sampled_from([0.1, 0.1, 0.2, 0.25, 0.04]))
     steps = draw(st.integers(1, 60) | st.integers(40, 60))
-    made = [Thing(30 + i, road, t, dt, steps) for i, t in enumerate(draw(st.lists(things, min_size=1, max_size=4)))]
+    made = [
+        Thing(30 + i, road, t, dt, steps)
+        for i, t in enumerate(draw(st.lists(things, min_size=1, max_size=4)))
+    ]
     scenario = Scenario(dt, ScenarioID(country_id="ZAM", map_name="Test", map_id=1))
     scenario.add_objects(road.network(draw(st.sampled_from([1, 2, 3, 3]))))
     for thing in made:
         scenario.add_objects(thing.obstacle())
     xy, heading = road.at(draw(between(6.0, 30.0)), draw(between(-0.3, 0.3)))
     start = InitialState(
-        time_step=0, position=xy, orientation=float(heading) + draw(between(-0.05, 0.05)), velocity=draw(between(0.0, 17.0)),
-        acceleration=draw(between(-2.0, 2.0)), yaw_rate=0.0, slip_angle=0.0,
+        time_step=0, position=xy, orientation=float(heading) + draw(between(-0.05, 0.05)),
+        velocity=draw(between(0.0, 17.0)), acceleration=draw(between(-2.0, 2.0)),
+        yaw_rate=0.0, slip_angle=0.0,
     )  # fmt: skip
     goal = GoalRegion([CustomState(time_step=Interval(max(steps - 1, 0), steps))])
     config = load_config(
@@ -205,7 +214,10 @@ def first_touch(result: RepairResult, made: list[Thing]) -> str | None:
         for thing in made:
             # Between its last step and the next one an obstacle is neither there nor not there.
             body = thing.body(i / FINE) if thing.name in there else None
-            if body is None or np.hypot(*(np.array(body.centroid.coords[0]) - (states.x[i], states.y[i]))) > 15.0:
+            if (
+                body is None
+                or np.hypot(*(np.array(body.centroid.coords[0]) - (states.x[i], states.y[i]))) > 15.0
+            ):
                 continue
             ego = ego or rectangle(states.x[i], states.y[i], states.orientation[i], *size)
             if ego.intersects(body):

@@ -164,7 +164,7 @@ def test_residuals_see_what_a_curve_breaks():
     result = backend.solve(problem)
     model = build_model(backend._structure(problem, False))
     instance, points = backend._instance(problem, model)
-    separation, _, why = backend._open(instance, points)
+    separation, _, why, _ = backend._open(instance, points)
     assert why == ""
     moved = result.curve.points - instance.origin
     assert max(instance.residuals(separation, moved).values()) <= 1e-6

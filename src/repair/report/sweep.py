@@ -60,8 +60,8 @@ def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[
         for backend in backends:
             own = [r for r in rows if r["backend"] == backend and r["reference"] == reference]
             status = Counter(r["status"] for r in own)
-            conflicts = [r for r in own if r["status"] not in ("no_conflict", "input_error", "crash", "timeout")]
-            braking = [r for r in conflicts if _avoidable(r)]
+            without = ("no_conflict", "input_error", "crash", "timeout")
+            braking = [r for r in own if r["status"] not in without and _avoidable(r)]
             times = [1e3 * r["search_time_s"] for r in own if r["search_time_s"] is not None and r["probes"]]
             body.append((
                 reference, backend, len(own), status["no_conflict"], status["found"], status["none_feasible"],
@@ -81,11 +81,13 @@ def _official(rows: Sequence[Row]) -> str:
     methods = ", ".join(f"{k}: {n}" for k, n in Counter(r["road_method"] for r in judged).items())
     text = (
         f"{len(judged)} trajectories (repaired, or the reference where there is no conflict) were written as "
-        f"solution files, read back and judged; {len(rejected)} were rejected. Road boundary by {methods or '-'}."
+        f"solution files, read back and judged; {len(rejected)} were rejected. "
+        f"Road boundary by {methods or '-'}."
     )
     if rejected:
         body = [[r[k] for k in ("file", "backend", "reference", "status", *keys)] for r in rejected]
-        text += "\n\n" + _table(("file", "backend", "reference", "status", "feasible", "no collision", "road"), body)
+        head = ("file", "backend", "reference", "status", "feasible", "no collision", "road")
+        text += "\n\n" + _table(head, body)
     return text
 
 
@@ -109,8 +111,8 @@ def _compared(rows: Sequence[Row], backends: Sequence[str]) -> str:
         share = 100.0 * (1.0 - len(lower) / len(pairs))
         names = "; ".join(f"{c['casadi']['file']} ({c['casadi']['reference']})" for c in lower)
         lines.append(
-            f"- `casadi` against `{other}`: F-TTR not below in {len(pairs) - len(lower)} of {len(pairs)} cases "
-            f"({share:.1f} %), above in {higher}." + (f" Below: {names}." if lower else "")
+            f"- `casadi` against `{other}`: F-TTR not below in {len(pairs) - len(lower)} of {len(pairs)} "
+            f"cases ({share:.1f} %), above in {higher}." + (f" Below: {names}." if lower else "")
         )
     return "\n".join(lines) or "One backend only."
 
@@ -121,9 +123,9 @@ def _above(rows: Sequence[Row]) -> str:
         if r["status"] == "found" and isinstance(r["ttr_s"], float) and r["f_ttr_s"] > r["ttr_s"] + 1e-9:
             harder = r["peak_deceleration_mps2"] is not None and r["peak_deceleration_mps2"] < -8.0
             sideways = r["maneuver"] in ("left", "right")
-            why = "brakes harder than 8 m/s²" if harder else "swerves" if sideways else "changes speed otherwise"
-            if sideways and harder:
-                why = "brakes and swerves"
+            why = "swerves" if sideways else "changes speed otherwise"
+            if harder:
+                why = "brakes and swerves" if sideways else "brakes harder than 8 m/s²"
             body.append((
                 r["file"], r["reference"], r["backend"], r["f_ttr_s"], r["ttr_s"], r["maneuver"],
                 round(r["peak_deceleration_mps2"], 2), why,
@@ -132,8 +134,8 @@ def _above(rows: Sequence[Row]) -> str:
         return "None."
     head = ("file", "reference", "backend", "F-TTR [s]", "TTR [s]", "manoeuvre", "a_min [m/s²]", "how")
     return (
-        "The TTR is that of fixed manoeuvres (full braking at 8 m/s², kick-down, steering); a repair may brake "
-        "up to its own limits, or combine.\n\n" + _table(head, body)
+        "The TTR is that of fixed manoeuvres (full braking at 8 m/s², kick-down, steering); a repair may "
+        "brake up to its own limits, or combine.\n\n" + _table(head, body)
     )
 
 
@@ -141,11 +143,9 @@ def _reasons(rows: Sequence[Row]) -> str:
     missed = [r for r in rows if r["status"] not in _REPAIRED]
     if not missed:
         return "Everything was repaired."
-    head = ("file", "reference", "backend", "status", "conflict", "TTC [s]", "TTB [s]", "what was tried, and what it failed on")
-    body = [
-        (r["file"], r["reference"], r["backend"], r["status"], r["conflict"], r["ttc_s"], r["ttb_s"], r["detail"])
-        for r in missed
-    ]
+    keys = ("file", "reference", "backend", "status", "conflict", "ttc_s", "ttb_s", "detail")
+    head = (*keys[:5], "TTC [s]", "TTB [s]", "what was tried, and what it failed on")
+    body = [tuple(r[k] for k in keys) for r in missed]
     return _table(head, body)
 
 
@@ -161,7 +161,8 @@ def _files(rows: Sequence[Row], backends: Sequence[str], reference: str) -> str:
     for file, cases in own.items():
         first = next(iter(cases.values()))
         behind = ", from behind" if first["from_behind"] else ""
-        cells: list[Any] = [file, f"{first['conflict'] or ''}{behind}", *(first[k] for k in ("ttc_s", "ttb_s", "ttr_s"))]
+        cells: list[Any] = [file, f"{first['conflict'] or ''}{behind}"]
+        cells += [first[k] for k in ("ttc_s", "ttb_s", "ttr_s")]
         for backend in backends:
             r = cases.get(backend)
             if r is None:

@@ -370,7 +370,7 @@ def _speed_limit(
         # a lanelet that begins before the path counts from its start on
         begin = 0.0 if not np.isfinite(entry) else float(np.clip(entry, 0.0, frame.length))
         begin = begin if not entries else max(begin, entries[-1][0])
-        entries.append((begin, np.inf if limit is None or not limit > 0.0 else float(limit)))
+        entries.append((begin, np.inf if limit is None or not 0.0 < limit <= _SPEED[1] else float(limit)))
     if all(np.isinf(limit) for _, limit in entries):
         return None
     s, speed = zip(*entries, strict=True)

@@ -158,7 +158,9 @@ def goal_areas(goal: Any) -> list[Any]:
             if not hasattr(type(shape), "shapely_object"):  # a point
                 continue
             if not (np.abs(getattr(shape, "vertices", shape.center)) <= FAR).all():
-                raise ScenarioError(f"the goal region has a vertex that is not finite or farther than {FAR:g} m out")
+                raise ScenarioError(
+                    f"the goal region has a vertex that is not finite or farther than {FAR:g} m out"
+                )
             found.append(shape.shapely_object)
     return found
 

@@ -181,9 +181,9 @@ class CasadiBackend:
         why = instance.start_violation()
         if why:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
-        separation, points, why = self._open(instance, points)
+        separation, points, why, closest = self._open(instance, points)
         if why:
-            return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+            return self._infeasible(instance, why, closest)
         points = self._warmer(instance, separation, points, warm_start)
         iterations = 0
         for round_ in range(self.config.rounds):
@@ -217,8 +217,24 @@ class CasadiBackend:
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
-    def _open(self, instance: Instance, points: Array) -> tuple[Separation, Array, str]:
+    def _infeasible(
+        self, instance: Instance, why: str, closest: tuple[Array, float] | None
+    ) -> SolveResult:
+        """No solution; with the curve that keeps all other linear rows and comes closest, where there is one."""
+        if closest is None:
+            return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+        points = frozen(closest[0] + instance.origin)
+        curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, points)
+        return SolveResult(
+            SolveStatus.INFEASIBLE, detail=why, residuals={"obstacles": closest[1]}, stages={"closest": curve}
+        )
+
+    def _open(
+        self, instance: Instance, points: Array
+    ) -> tuple[Separation, Array, str, tuple[Array, float] | None]:
         """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
+
+        The last item is the curve that misses the obstacles by the least, and by how much [m].
 
         The guide's sides come first. Where they contradict the limits, the curve that misses the
         obstacles by the least is asked for its sides instead, and so on.
@@ -232,10 +248,11 @@ class CasadiBackend:
             shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
         room = instance.room(shape)
         why, before = "", None
+        closest: tuple[Array, float] | None = None
         for _ in range(_SIDES):
             separation = separate(problem, windows, len(model.obstacle), shape, room)
             if separation.why:
-                return separation, points, separation.why
+                return separation, points, separation.why, closest
             side = separation.side
             if before is not None and side is not None and np.array_equal(side, before):
                 break
@@ -246,15 +263,18 @@ class CasadiBackend:
             if feasible:
                 x, feasible = model.presolve(x, slope, low, high)
             if feasible:
-                return separation, model.with_unknowns(points, x), ""
+                return separation, model.with_unknowns(points, x), "", closest
             elastic = model.elastic(slope, low, high)
             if elastic is None:
-                return separation, points, "no curve from the start state keeps the limits and the road"
+                why = why or "no curve from the start state keeps the limits and the road"
+                return separation, points, why, closest
             points = model.with_unknowns(points, elastic[0])
+            if closest is None or elastic[1] < closest[1]:
+                closest = points, float(elastic[1])
             why = why or _missed(instance, separation, points, elastic[1])
             shape = instance.shape(points)
             room = instance.room(shape)
-        return separation, points, why
+        return separation, points, why, closest
 
     def _warmer(
         self, instance: Instance, separation: Separation, points: Array, warm_start: Curve | None
