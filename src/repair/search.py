@@ -154,7 +154,11 @@ def _probe(
                 margin -= solve.residuals["obstacles"]
                 detail = f"with a margin of {margin:.2f} m: {solve.detail}"
                 solve = replace(
-                    solve, status=SolveStatus.SOLVED, curve=closest, detail=detail, residuals={"obstacles": 0.0}
+                    solve,
+                    status=SolveStatus.SOLVED,
+                    curve=closest,
+                    detail=detail,
+                    residuals={"obstacles": 0.0},
                 )
                 verdict = again
         maneuver = problem.passing.maneuver if problem.passing is not None else None

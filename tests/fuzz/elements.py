@@ -19,8 +19,7 @@ ODD_NAMES = (
 )  # fmt: skip
 
 
-
-def parents(root: Element) -> dict[Element, Element]:
+def parents_of(root: Element) -> dict[Element, Element]:
     return {child: parent for parent in root.iter() for child in parent}
 
 
@@ -37,24 +36,24 @@ def is_number(text: str | None) -> bool:
     return True
 
 
-def numbers(root: Element) -> list[Element]:
+def number_leaves(root: Element) -> list[Element]:
     return [e for e in root.iter() if not len(e) and is_number(e.text)]
 
 
-def leaf(tag: str, text: str) -> Element:
+def make_leaf(tag: str, text: str) -> Element:
     made = Element(tag)
     made.text = text
     return made
 
 
-def point(x: float, y: float, tag: str = "point") -> Element:
+def make_point(x: float, y: float, tag: str = "point") -> Element:
     made = Element(tag)
-    made.extend([leaf("x", repr(x)), leaf("y", repr(y))])
+    made.extend([make_leaf("x", repr(x)), make_leaf("y", repr(y))])
     return made
 
 
 def delete_element(rng: random.Random, root: Element) -> None:
-    parents = parents(root)
+    parents = parents_of(root)
     # First a tag, then one of its elements: or nearly all would be points of lanelets.
     tag = rng.choice(sorted({e.tag for e in parents}))
     for victim in rng.sample([e for e in parents if e.tag == tag], 1):
@@ -63,20 +62,20 @@ def delete_element(rng: random.Random, root: Element) -> None:
 
 def delete_all_of_a_kind(rng: random.Random, root: Element) -> None:
     tag = rng.choice(sorted({e.tag for e in root.iter()} - {root.tag}))
-    for child, parent in parents(root).items():
+    for child, parent in parents_of(root).items():
         if child.tag == tag and child in parent:
             parent.remove(child)
 
 
 def duplicate_element(rng: random.Random, root: Element) -> None:
-    parents = parents(root)
+    parents = parents_of(root)
     tag = rng.choice(sorted({e.tag for e in parents}))
     twin = rng.choice([e for e in parents if e.tag == tag])
     parents[twin].insert(list(parents[twin]).index(twin), copy.deepcopy(twin))
 
 
 def move_element(rng: random.Random, root: Element) -> None:
-    parents = parents(root)
+    parents = parents_of(root)
     tag = rng.choice(sorted({e.tag for e in parents}))
     moved = rng.choice([e for e in parents if e.tag == tag])
     inside = set(moved.iter())
@@ -102,7 +101,7 @@ def rename_tag(rng: random.Random, root: Element) -> None:
 
 
 def odd_number(rng: random.Random, root: Element) -> None:
-    parents, numbers = parents(root), numbers(root)
+    parents, numbers = parents_of(root), number_leaves(root)
     group = rng.choice(sorted({parents[e].tag for e in numbers if e in parents}))
     chosen = [e for e in numbers if e in parents and parents[e].tag == group]
     # The new text is drawn before the element.
@@ -111,13 +110,13 @@ def odd_number(rng: random.Random, root: Element) -> None:
 
 
 def many_odd_numbers(rng: random.Random, root: Element) -> None:
-    numbers = numbers(root)
+    numbers = number_leaves(root)
     for element in rng.sample(numbers, min(len(numbers), rng.choice([3, 10, 100]))):
         element.text = rng.choice(ODD_NUMBERS)
 
 
 def scale_number(rng: random.Random, root: Element) -> None:
-    element = rng.choice(numbers(root))
+    element = rng.choice(number_leaves(root))
     element.text = repr(float(element.text or 0.0) * rng.choice([-1.0, 0.0, 1e-6, 10.0, 1e3, 1e6]))
 
 
@@ -147,7 +146,7 @@ def text_in_place_of_children(rng: random.Random, root: Element) -> None:
 def jitter(rng: random.Random, root: Element) -> None:
     """Noise on many numbers: bounds that cross, bodies that jump."""
     noise, share = rng.choice([0.001, 0.02, 0.3]), rng.choice([0.02, 0.3, 1.0])
-    for leaf in numbers(root):
+    for leaf in number_leaves(root):
         if leaf.text and not leaf.text.isdigit() and rng.random() < share:
             leaf.text = repr(float(leaf.text) * (1.0 + rng.gauss(0.0, noise)))
 
@@ -168,7 +167,6 @@ def translate(rng: random.Random, root: Element) -> None:
     for leaf in root.iter():
         if leaf.tag in ("x", "y") and is_number(leaf.text):
             leaf.text = repr(float(leaf.text or 0) + shift)
-
 
 
 GENERIC = (

@@ -19,7 +19,6 @@ BYTE_MUTATIONS: dict[str, Callable[[random.Random, bytes], bytes]] = {f.__name__
 _GENERIC = tuple(f.__name__ for f in GENERIC)
 
 
-
 def damage_xml(rng: random.Random, data: bytes, name: str | None = None) -> tuple[bytes, str]:
     """One to three XML mutations; ``name`` fixes the first. Returns the file and what was done to it.
 
@@ -42,7 +41,6 @@ def damage_xml(rng: random.Random, data: bytes, name: str | None = None) -> tupl
             done.append(each)
         except IndexError:  # nothing is left that this one could damage
             pass
-
 
 
 def damage_bytes(rng: random.Random, data: bytes, name: str) -> tuple[bytes, str]:

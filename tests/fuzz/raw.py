@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 
 
-
 def truncate(rng: random.Random, data: bytes) -> bytes:
     return data[: rng.randrange(len(data))]
 

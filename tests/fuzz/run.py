@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from tests.fuzz import mutate, settings
+from tests.fuzz import configs, mutate
 
 __all__ = ["Case", "Outcome", "Settings", "fuzz", "run_case", "scenario_files", "table"]
 
@@ -92,7 +92,7 @@ def make_case(index: int, settings: Settings, folder: Path) -> Case:
     overrides = ["search.time_limit=1.0"]
     if family == "configuration":
         config = folder / "settings.yaml"
-        config.write_bytes(settings.config_text(rng, name))
+        config.write_bytes(configs.config_text(rng, name))
         return Case(family, name, small, tuple(overrides), config)
     if family == "solution file":
         path, (scenario, data) = folder / "solution.xml", _solution(settings.files)

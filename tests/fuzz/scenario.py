@@ -7,7 +7,16 @@ import math
 import random
 from xml.etree import ElementTree as ET
 
-from tests.fuzz.elements import ODD_NAMES, ODD_NUMBERS, Element, any_of, is_number, leaf, numbers, point
+from tests.fuzz.elements import (
+    ODD_NAMES,
+    ODD_NUMBERS,
+    Element,
+    any_of,
+    is_number,
+    make_leaf,
+    make_point,
+    number_leaves,
+)
 
 _STEPS = (
     "0", "-0.1", "nan", "inf", "-inf", "", "abc", "1e-9", "1e9", "1e-320", "1e308", "0.25", "5", "0.001", "1,0", "10",
@@ -17,7 +26,6 @@ _MOVING = ("dynamicObstacle", "obstacle")
 _BODIES = (*_MOVING, "staticObstacle")
 _STATES = ("initialState", "state", "goalState")
 _BOUNDS = ("leftBound", "rightBound")
-
 
 
 def swap_ids(rng: random.Random, root: Element) -> None:
@@ -66,7 +74,7 @@ def time_interval(rng: random.Random, root: Element) -> None:
         low, high = rng.choice(
             [("0", "3"), ("5", "2"), ("-5", "5"), ("0", "1000000000"), ("nan", "4"), ("0", "")]
         )
-        time[:] = [leaf("intervalStart", low), leaf("intervalEnd", high)]
+        time[:] = [make_leaf("intervalStart", low), make_leaf("intervalEnd", high)]
 
 
 def drop_from_states(rng: random.Random, root: Element) -> None:
@@ -87,7 +95,7 @@ def uncertain_value(rng: random.Random, root: Element) -> None:
         low, high = rng.choice(
             [("-0.1", "0.2"), ("3", "8"), ("0.2", "-0.2"), ("-9", "9"), ("nan", "1"), ("0", "0"), ("", "1")]
         )
-        element[:] = [leaf("intervalStart", low), leaf("intervalEnd", high)]
+        element[:] = [make_leaf("intervalStart", low), make_leaf("intervalEnd", high)]
 
 
 def uncertain_position(rng: random.Random, root: Element) -> None:
@@ -104,18 +112,24 @@ def _area(rng: random.Random, x: float, y: float) -> Element:
     kind = rng.choice(["circle", "rectangle", "polygon", "line", "dot"])
     if kind == "circle":
         made = Element("circle")
-        made.extend([leaf("radius", rng.choice(["0.5", "3", "0", "-1", "1e9"])), point(x, y, "center")])
+        made.extend(
+            [make_leaf("radius", rng.choice(["0.5", "3", "0", "-1", "1e9"])), make_point(x, y, "center")]
+        )
         return made
     if kind == "rectangle":
         made = Element("rectangle")
-        sizes = [leaf(name, rng.choice(["1", "4", "0", "-2", "1e6"])) for name in ("length", "width")]
+        sizes = [make_leaf(name, rng.choice(["1", "4", "0", "-2", "1e6"])) for name in ("length", "width")]
         made.extend(
-            [*sizes, leaf("orientation", rng.choice(["0", "1.2", "99", "nan"])), point(x, y, "center")]
+            [
+                *sizes,
+                make_leaf("orientation", rng.choice(["0", "1.2", "99", "nan"])),
+                make_point(x, y, "center"),
+            ]
         )
         return made
     outlines = {"polygon": [(-1, -1), (1, -1), (0, 2)], "line": [(0, 0), (1, 1), (2, 2)], "dot": [(0, 0)] * 3}
     made = Element("polygon")
-    made.extend([point(x + dx, y + dy) for dx, dy in outlines[kind]])
+    made.extend([make_point(x + dx, y + dy) for dx, dy in outlines[kind]])
     return made
 
 
@@ -222,7 +236,7 @@ def odd_goal(rng: random.Random, root: Element) -> None:
         ids = [e.attrib.get("id", "1") for e in root.iter("lanelet")]
         position[:] = [Element("lanelet", {"ref": rng.choice([*ids, "424242"])})]
     elif kind == "point":
-        position[:] = [point(1.0, 2.0)]
+        position[:] = [make_point(1.0, 2.0)]
     else:
         position[:] = [_area(rng, *((1e7, -1e7) if kind == "far" else (0.0, 0.0)))]
 
@@ -237,7 +251,7 @@ def second_problem(rng: random.Random, root: Element) -> None:
 
 def odd_start(rng: random.Random, root: Element) -> None:
     state = root.find("planningProblem/initialState")
-    numbers = [] if state is None else numbers(state)
+    numbers = [] if state is None else number_leaves(state)
     if numbers:
         changed = rng.choice(numbers)
         changed.text = rng.choice(
@@ -256,7 +270,6 @@ def odd_header(rng: random.Random, root: Element) -> None:
     root.attrib[name] = rng.choice([*ODD_NAMES, "2017a", "2018b", "2020a", "9999z"])
     if rng.random() < 0.2:
         del root.attrib[name]
-
 
 
 SCENARIO = (

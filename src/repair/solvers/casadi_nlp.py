@@ -217,10 +217,8 @@ class CasadiBackend:
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
-    def _infeasible(
-        self, instance: Instance, why: str, closest: tuple[Array, float] | None
-    ) -> SolveResult:
-        """No solution; with the curve that keeps all other linear rows and comes closest, where there is one."""
+    def _infeasible(self, instance: Instance, why: str, closest: tuple[Array, float] | None) -> SolveResult:
+        """No solution; with the curve, if any, that keeps all other linear rows and comes closest."""
         if closest is None:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
         points = frozen(closest[0] + instance.origin)
