@@ -13,7 +13,7 @@ ODD_CONFIG = (
     "-1", "0", "1e300", "-1e300", "1e-300", "99999999999999999999", "2001-01-01", "0x10", "1:30",
     "${search.delta_t}", "${missing}", "${", "???", "!!python/object:os.system x", "!!binary aGk=",
     "*unknown", "'\\x00'",
-
+)  # fmt: skip
 
 
 def config_text(rng: random.Random, name: str) -> bytes:
@@ -68,11 +68,16 @@ def _garbage(rng: random.Random) -> bytes:
     return rng.choice(
         [
             b"", b"\n", b"- 1\n- 2\n", b"text", b"7", b"search", b"search:", b"search: [1]", b"\tsearch: 1",
-            b"{", b"[" * 5000, b"{a: " * 3000, b"a: b: c", b"\xff\xfe\xfd", b"\x00", "\n".join(bomb).encode(),
+            b"{",
+            b"[" * 5000, b"{a: " * 3000, b"a: b: c", b"\xff\xfe\xfd", b"\x00", "\n".join(bomb).encode(),
             b"search: &s\n  delta_t: 0.2\n  <<: *s", b"? [a, b]\n: 1", b"1: 2", b"null: 1", b"search: {1: 2}",
             b"search:\n  delta_t: 0.1\n  delta_t: 0.2", b"--- {}\n--- {}", b"!!set {a}",
             b"!!python/object/apply:os.getcwd []", b"for_backend: {ego: 3}",
-            b"for_backend: {ego: {backend: casadi}}", b"for_backend: {ego: {for_backend: {ego: {}}}}",
-            b"for_backend: {ego: {search: 1}}", b"for_backend: 3", b"scenario: [1]", b"backend: [ego]",
-            b"backend: nothing", b"search: ${scene}", b"search: {delta_t: '${search.delta_t}'}",
-            b"seed: ${oc.env:HOME}", b"driver: ???", b"<xml/>", rng.randbytes(200),
+            b"for_backend: {ego: {backend: casadi}}",
+            b"for_backend: {ego: {for_backend: {ego: {}}}}", b"for_backend: {ego: {search: 1}}",
+            b"for_backend: 3",
+            b"scenario: [1]", b"backend: [ego]", b"backend: nothing", b"search: ${scene}",
+            b"search: {delta_t: '${search.delta_t}'}", b"seed: ${oc.env:HOME}", b"driver: ???", b"<xml/>",
+            rng.randbytes(200),
+        ]
+    )  # fmt: skip

@@ -141,6 +141,7 @@ def text_in_place_of_children(rng: random.Random, root: Element) -> None:
     tag = rng.choice(sorted({e.tag for e in root.iter() if len(e) and e is not root}))
     element = rng.choice([e for e in root.iter() if e.tag == tag and len(e)])
     element[:] = []
+    element.text = rng.choice(["", "7", "text"])
 
 
 def jitter(rng: random.Random, root: Element) -> None:
@@ -170,7 +171,9 @@ def translate(rng: random.Random, root: Element) -> None:
 
 
 GENERIC = (
-    delete_element, delete_all_of_a_kind, duplicate_element, move_element, shuffle_children, rename_tag, odd_number,
-    many_odd_numbers, scale_number, odd_attribute, deep_nesting, text_in_place_of_children, jitter, scale_world,
+    delete_element, delete_all_of_a_kind, duplicate_element, move_element, shuffle_children, rename_tag,
+    odd_number, many_odd_numbers, scale_number, odd_attribute, deep_nesting, text_in_place_of_children,
+    jitter,
+    scale_world,
     translate,
 )  # fmt: skip

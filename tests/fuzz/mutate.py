@@ -19,7 +19,9 @@ BYTE_MUTATIONS: dict[str, Callable[[random.Random, bytes], bytes]] = {f.__name__
 _GENERIC = tuple(f.__name__ for f in GENERIC)
 
 
-def damage_xml(rng: random.Random, data: bytes, name: str | None = None) -> tuple[bytes, str]:
+def damage_xml(
+    rng: random.Random, data: bytes, name: str | None = None, *, stack: bool = True
+) -> tuple[bytes, str]:
     """One to three XML mutations; ``name`` fixes the first. Returns the file and what was done to it.
 
     Parameters
@@ -29,11 +31,13 @@ def damage_xml(rng: random.Random, data: bytes, name: str | None = None) -> tupl
         A well-formed XML file.
     name : str, optional
         Key of :data:`XML_MUTATIONS`; ``generic`` for one that suits any XML file.
+    stack : bool
+        Whether others may follow.
     """
     root = ET.fromstring(data)
     first = rng.choice(_GENERIC) if name == "generic" else name or rng.choice(sorted(XML_MUTATIONS))
     pool = _GENERIC if name == "generic" else sorted(XML_MUTATIONS)
-    names = [first] + [rng.choice(pool) for _ in range(rng.choice([0, 0, 1, 2]))]
+    names = [first] + [rng.choice(pool) for _ in range(rng.choice([0, 0, 1, 2]) * stack)]
     done = []
     for each in names:
         try:
@@ -41,7 +45,9 @@ def damage_xml(rng: random.Random, data: bytes, name: str | None = None) -> tupl
             done.append(each)
         except IndexError:  # nothing is left that this one could damage
             pass
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True), "+".join(done) or "unchanged"
 
 
 def damage_bytes(rng: random.Random, data: bytes, name: str) -> tuple[bytes, str]:
     """One byte-level mutation, by name."""
+    return BYTE_MUTATIONS[name](rng, data), name

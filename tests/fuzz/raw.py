@@ -88,6 +88,6 @@ def external_entity(rng: random.Random, data: bytes) -> bytes:
 
 
 RAW = (
-    truncate, flip_bytes, change_digits, delete_span, repeat_span, wrong_encoding, not_a_scenario, entity_bomb,
-    external_entity,
+    truncate, flip_bytes, change_digits, delete_span, repeat_span, wrong_encoding, not_a_scenario,
+    entity_bomb, external_entity,
 )  # fmt: skip

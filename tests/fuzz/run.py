@@ -30,7 +30,7 @@ __all__ = ["Case", "Outcome", "Settings", "fuzz", "run_case", "scenario_files", 
 
 BUG = "BUG"
 CONFIGS = ("extremes", "types", "garbage")
-SOLUTIONS = ("generic", "generic", "bytes", "foreign")
+SOLUTIONS = ("generic", "jitter", "scale_number", "bytes", "foreign")
 _SLOTS = (
     *(("scenario: XML", name) for name in sorted(mutate.XML_MUTATIONS)),
     *(("scenario: bytes", name) for name in sorted(mutate.BYTE_MUTATIONS)),
@@ -101,7 +101,7 @@ def make_case(index: int, settings: Settings, folder: Path) -> Case:
         elif name == "bytes":
             data, name = mutate.damage_bytes(rng, data, rng.choice(sorted(mutate.BYTE_MUTATIONS)))
         else:
-            data, name = mutate.damage_xml(rng, data, "generic")
+            data, name = mutate.damage_xml(rng, data, name, stack=name == "generic")
         path.write_bytes(data)
         overrides += ["reference.source=file", f"reference.file='{path}'"]
         return Case(family, name, scenario, tuple(overrides), None)

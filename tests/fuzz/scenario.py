@@ -19,7 +19,8 @@ from tests.fuzz.elements import (
 )
 
 _STEPS = (
-    "0", "-0.1", "nan", "inf", "-inf", "", "abc", "1e-9", "1e9", "1e-320", "1e308", "0.25", "5", "0.001", "1,0", "10",
+    "0", "-0.1", "nan", "inf", "-inf", "", "abc", "1e-9", "1e9", "1e-320", "1e308", "0.25", "5", "0.001",
+    "1,0", "10",
 )  # fmt: skip
 
 _MOVING = ("dynamicObstacle", "obstacle")
@@ -274,6 +275,6 @@ def odd_header(rng: random.Random, root: Element) -> None:
 
 SCENARIO = (
     swap_ids, same_id, odd_reference, shift_times, odd_time, time_interval, drop_from_states, uncertain_value,
-    uncertain_position, odd_shape, no_prediction, gap_in_prediction, obstacle_on_the_ego, odd_bound, odd_topology,
-    no_goal, odd_goal, second_problem, odd_start, odd_time_step, odd_header,
+    uncertain_position, odd_shape, no_prediction, gap_in_prediction, obstacle_on_the_ego, odd_bound,
+    odd_topology, no_goal, odd_goal, second_problem, odd_start, odd_time_step, odd_header,
 )  # fmt: skip

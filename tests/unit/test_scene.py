@@ -448,10 +448,11 @@ def check(made: Scene) -> None:
     assert np.all((made.same_direction.left <= made.road.left + 1e-9)[from_ego])
 
 
-def test_every_file_gives_a_scene_or_a_sentence(scenarios: Path) -> None:
+def test_files_give_a_scene_or_a_sentence(scenarios: Path) -> None:
+    # tests/integration/test_all_files.py loads them all; here a fifth of them is looked at closely.
     files = sorted(scenarios.glob("*.xml")) + sorted((scenarios.parent / "traps").glob("*.xml"))
     refused = {}
-    for file in files:
+    for file in files[::5]:
         try:
             check(load_scene(file))
         except RepairError as error:
