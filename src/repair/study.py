@@ -30,8 +30,8 @@ COLUMNS = (
     "file", "backend", "reference", "status", "detail", "conflict", "obstacle_id", "from_behind", "ttc_s",
     "contact_ttc_s", "f_ttr_s", "ttb_s", "ttr_s", "maneuver", "peak_deceleration_mps2",
     "peak_lateral_acceleration_mps2", "min_speed_mps", "largest_residual", "probes", "official_feasible",
-    "official_collision_free", "official_on_road", "road_method", "load_time_s", "prepare_time_s",
-    "search_time_s", "solve_time_s", "check_time_s", "official_time_s",
+    "official_collision_free", "official_on_road", "road_method", "certificate", "load_time_s",
+    "prepare_time_s", "search_time_s", "solve_time_s", "check_time_s", "official_time_s",
 )  # fmt: skip
 
 
@@ -47,6 +47,8 @@ class SweepSettings:
         ``key=value``, for all backends.
     official : bool
         Write each trajectory as a solution file and have CommonRoad's checker judge it.
+    certify : bool
+        Write each result and recompute its margins from the files (:func:`repair.certify.certify`).
     timeout : float
         Wall time for one file [s], all backends and references together.
     jobs : int
@@ -58,6 +60,7 @@ class SweepSettings:
     preset: str | None = None
     overrides: Sequence[str] = ()
     official: bool = True
+    certify: bool = False
     timeout: float = 300.0
     jobs: int = 1
 
@@ -146,6 +149,8 @@ def _row(
     )
     if settings.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row.update(_official(result))
+    if settings.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
+        row["certificate"] = _certificate(result)
     return row
 
 
@@ -158,6 +163,17 @@ def _why(probe: Any) -> str:
     tried = "; ".join(probe.tried)
     details = "; ".join(f"{v.reason.value} at {v.time:.2f} s: {v.detail}" for v in probe.verdict.violations)
     return f"{tried} | {details}" if tried else details
+
+
+def _certificate(result: Any) -> str:
+    """``ok``, or the margins that are violated."""
+    from repair.certify import certify
+    from repair.export import save
+
+    with tempfile.TemporaryDirectory() as folder:
+        save(result, Path(folder), figure=False)
+        certificate = certify(Path(folder))
+    return "; ".join(row.name for row in certificate.rows if not row.ok) or "ok"
 
 
 def _official(result: Any) -> dict[str, Any]:

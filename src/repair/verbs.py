@@ -179,6 +179,11 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
         "--timeout", type=float, default=300.0, metavar="S", help="wall time for one file [s]"
     )
     parser.add_argument("--report", metavar="FILE.md", type=Path, help="write a report of the rows")
+    parser.add_argument(
+        "--certify",
+        action="store_true",
+        help="recompute every margin from the written files, as `repair certify`",
+    )
     parser.add_argument("--no-official", action="store_true", help="leave CommonRoad's own checker out")
 
 
@@ -190,7 +195,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     settings = SweepSettings(
         backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"],
         preset=arguments.preset, overrides=arguments.overrides, official=not arguments.no_official,
-        timeout=arguments.timeout, jobs=arguments.jobs,
+        certify=arguments.certify, timeout=arguments.timeout, jobs=arguments.jobs,
     )  # fmt: skip
     rows = run_sweep(arguments.folder, settings)
     if arguments.report is not None:

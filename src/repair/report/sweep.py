@@ -84,6 +84,16 @@ def _official(rows: Sequence[Row]) -> str:
         f"solution files, read back and judged; {len(rejected)} were rejected. "
         f"Road boundary by {methods or '-'}."
     )
+    certified = [r for r in rows if r.get("certificate")]
+    if certified:
+        broken = [r for r in certified if r["certificate"] != "ok"]
+        text += (
+            f"\n\n{len(certified)} certificates were recomputed from the written files; "
+            f"{len(broken)} have a violated margin."
+        )
+        if broken:
+            body = [[r[k] for k in ("file", "backend", "reference", "certificate")] for r in broken]
+            text += "\n\n" + _table(("file", "backend", "reference", "violated"), body)
     if rejected:
         body = [[r[k] for k in ("file", "backend", "reference", "status", *keys)] for r in rejected]
         head = ("file", "backend", "reference", "status", "feasible", "no collision", "road")

@@ -217,22 +217,24 @@ class CasadiBackend:
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
-    def _infeasible(self, instance: Instance, why: str, closest: tuple[Array, float] | None) -> SolveResult:
+    def _infeasible(
+        self, instance: Instance, why: str, closest: tuple[Array, dict[str, float]] | None
+    ) -> SolveResult:
         """No solution; with the curve, if any, that keeps all other linear rows and comes closest."""
         if closest is None:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
         points = frozen(closest[0] + instance.origin)
         curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, points)
         return SolveResult(
-            SolveStatus.INFEASIBLE, detail=why, residuals={"obstacles": closest[1]}, stages={"closest": curve}
+            SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve}
         )
 
     def _open(
         self, instance: Instance, points: Array
-    ) -> tuple[Separation, Array, str, tuple[Array, float] | None]:
+    ) -> tuple[Separation, Array, str, tuple[Array, dict[str, float]] | None]:
         """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
 
-        The last item is the curve that misses the obstacles by the least, and by how much [m].
+        The last item is the curve that misses the obstacles by the least, and what it violates.
 
         The guide's sides come first. Where they contradict the limits, the curve that misses the
         obstacles by the least is asked for its sides instead, and so on.
@@ -246,7 +248,7 @@ class CasadiBackend:
             shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
         room = instance.room(shape)
         why, before = "", None
-        closest: tuple[Array, float] | None = None
+        closest: tuple[Array, dict[str, float]] | None = None
         for _ in range(_SIDES):
             separation = separate(problem, windows, len(model.obstacle), shape, room)
             if separation.why:
@@ -262,13 +264,14 @@ class CasadiBackend:
                 x, feasible = model.presolve(x, slope, low, high)
             if feasible:
                 return separation, model.with_unknowns(points, x), "", closest
-            elastic = model.elastic(slope, low, high)
+            modest = instance.bounds(separation, points, modest=True)
+            elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
             if elastic is None:
                 why = why or "no curve from the start state keeps the limits and the road"
                 return separation, points, why, closest
             points = model.with_unknowns(points, elastic[0])
-            if closest is None or elastic[1] < closest[1]:
-                closest = points, float(elastic[1])
+            if closest is None or elastic[1] < closest[1]["obstacles"]:
+                closest = points, instance.residuals(separation, points) | {"obstacles": float(elastic[1])}
             why = why or _missed(instance, separation, points, elastic[1])
             shape = instance.shape(points)
             room = instance.room(shape)

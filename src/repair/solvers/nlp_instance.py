@@ -100,11 +100,13 @@ class Instance:
         return lower, upper
 
     def bounds(
-        self, separation: Separation, around: Array, trust: float | None = None
+        self, separation: Separation, around: Array, trust: float | None = None, modest: bool = False
     ) -> tuple[Array, Array]:
         """Bounds of all rows of the model, taken in by the solver's own tolerance.
 
         ``around`` are control points nearby; with ``trust`` [m] s stays that close to their curve.
+        ``modest`` keeps the accelerations inside the share of the friction circle that the nonlinear
+        rows use, for a solution that is sought without those rows.
         """
         model = self.model
         lower, upper = list(self.lower), list(self.upper)
@@ -117,6 +119,8 @@ class Instance:
                     here = rows.matrix @ around[:, 0]
                     lower[k] = np.maximum(lower[k], np.minimum(here - trust, upper[k]))
                     upper[k] = np.minimum(upper[k], np.maximum(here + trust, lower[k]))
+            elif modest and rows.family == "acceleration":
+                lower[k], upper[k] = _FRICTION * lower[k], _FRICTION * upper[k]
         if self.problem.lateral:
             ends = self._room_of_ends(around, min(ROAD_SLACK, trust or _INF), _EDGE)
             lower += [ends[0], ends[2]]
