@@ -381,7 +381,7 @@ def saved(result: RepairResult, folder: Path, *, figure: bool = True) -> tuple[d
         If the folder or a file in it cannot be written; nothing half-written is left.
     """
     scene, content = result.prepared.scene, to_dict(result)
-    name = re.sub(r"[^\w.-]", "_", scene.id)
+    name = re.sub(r"[^\w.-]", "_", scene.id)[:100]
     solution, figures = f"solution_{name}.xml", ("profiles.png", "birdseye.png")
     files: dict[str, bytes] = {}
     if _solved(result):
