@@ -421,11 +421,10 @@ def _official(folder: Path, content: Mapping[str, Any], prepared: Prepared) -> l
 
 def _difference(file: Path, content: Mapping[str, Any], prepared: Prepared) -> float:
     """Largest distance [m] between the positions in the solution file and those on the curves."""
-    from commonroad.common.solution import CommonRoadSolutionReader
-
     from repair.checker import SplicedCurve
+    from repair.scene.reading import read_solution
 
-    solution = CommonRoadSolutionReader.open(str(file))
+    solution = read_solution(file)
     states = solution.planning_problem_solutions[0].trajectory.state_list
     written = np.array([s.position for s in states])
     first = prepared.scene.initial_time_step

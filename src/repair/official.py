@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from repair.errors import RepairError
-
 __all__ = ["OfficialVerdict", "check_solution_file"]
 
 
@@ -64,13 +62,11 @@ def check_solution_file(
     RepairError
         If the file is no solution file.
     """
-    from commonroad.common.solution import CommonRoadSolutionReader
     from commonroad_dc.feasibility import solution_checker
 
-    try:
-        solution = CommonRoadSolutionReader.open(str(file))
-    except Exception as error:
-        raise RepairError(f"{file} is not a CommonRoad solution file: {error}") from error
+    from repair.scene.reading import read_solution
+
+    solution = read_solution(file)
     scenario = deepcopy(scenario)
     for obstacle in [o for o in scenario.dynamic_obstacles if o.obstacle_id in without]:
         scenario.remove_obstacle(obstacle)

@@ -331,20 +331,13 @@ def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
     """Reference from a CommonRoad solution file of the same scenario."""
     if not file:
         raise ReferenceTrajectoryError("reference.source is file, but reference.file names no solution file")
-    from commonroad.common.solution import CommonRoadSolutionReader
-
-    from repair.scene.reading import read_xml
+    from repair.scene.reading import read_solution
 
     path = Path(file)
     try:
-        solution = CommonRoadSolutionReader.fromstring(read_xml(path)[0])
+        solution = read_solution(path)
     except ScenarioError as error:
-        raise ReferenceTrajectoryError(f"solution file {error}") from error
-    except Exception as error:  # commonroad-io raises whatever the broken part happens to cause
-        first = (str(error).splitlines() or [""])[0]
-        raise ReferenceTrajectoryError(
-            f"{path} is not a CommonRoad solution file: {type(error).__name__} {first}"
-        ) from error
+        raise ReferenceTrajectoryError(str(error)) from error
     if str(solution.scenario_id) not in (scene.id, str(scene.scenario.scenario_id)):
         raise ReferenceTrajectoryError(f"{path} is a solution for {solution.scenario_id}, not for {scene.id}")
     matching = [

@@ -31,6 +31,7 @@ def sweep_report(rows: Sequence[Row], command: str) -> str:
         "## What CommonRoad's own checker says\n\n" + _official(rows),
         "## Backends compared\n\n" + _compared(rows, backends),
         "## F-TTR above the TTR\n\n" + _above(rows),
+        "## Repaired although braking does not help\n\n" + _beyond_braking(rows),
         "## Not repaired, and why\n\n" + _reasons(rows),
         "## Every file\n\n" + "\n\n".join(_files(rows, backends, reference) for reference in references),
     ]
@@ -147,6 +148,15 @@ def _above(rows: Sequence[Row]) -> str:
         "The TTR is that of fixed manoeuvres (full braking at 8 m/s², kick-down, steering); a repair may "
         "brake up to its own limits, or combine.\n\n" + _table(head, body)
     )
+
+
+def _beyond_braking(rows: Sequence[Row]) -> str:
+    found = [r for r in rows if r["status"] == "found" and r["ttb_s"] == "-inf"]
+    if not found:
+        return "None."
+    head = ("file", "reference", "backend", "conflict", "TTC [s]", "TTR [s]", "F-TTR [s]", "manoeuvre")
+    keys = ("file", "reference", "backend", "conflict", "ttc_s", "ttr_s", "f_ttr_s", "maneuver")
+    return _table(head, [[r[k] for k in keys] for r in found])
 
 
 def _reasons(rows: Sequence[Row]) -> str:

@@ -130,7 +130,7 @@ class FrenetFrame:
         """
         clean = _clean(points)
         if smoothing > 0.0:
-            clean = _smooth(_resample_chord(clean, spacing), smoothing)
+            clean = _clean(_smooth(_resample_chord(clean, spacing), smoothing))  # smoothing may fold a spike
         table, length = _arc_length_table(clean)
         return cls(table, length, max_lateral=max_lateral)
 

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 from repair.errors import ScenarioError
 
-__all__ = ["FileContents", "read_file", "read_xml"]
+__all__ = ["FileContents", "read_file", "read_solution", "read_xml"]
 
 _SIZE_MAX = 200_000_000  # bytes
 _TIME_STEP = (1e-3, 10.0)  # smallest and largest [s]
@@ -138,6 +138,26 @@ def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
         problems=problems.planning_problem_dict,
         notes=notes,
     )
+
+
+def read_solution(path: Path) -> Any:
+    """Read a CommonRoad solution file; returns the ``commonroad.common.solution.Solution``.
+
+    Raises
+    ------
+    ScenarioError
+        Whatever is wrong with it, in one sentence that names the file.
+    """
+    from commonroad.common.solution import CommonRoadSolutionReader
+
+    data = read_xml(path)[0]
+    try:
+        return CommonRoadSolutionReader.fromstring(data)
+    except Exception as error:  # as above
+        cause = " ".join(str(error).split())[:200]
+        raise ScenarioError(
+            f"{path} is not a CommonRoad solution file: {type(error).__name__} {cause}"
+        ) from error
 
 
 def _check_time_step(text: str | None, name: str) -> None:
