@@ -337,7 +337,7 @@ def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
     try:
         solution = read_solution(path)
     except ScenarioError as error:
-        raise ReferenceTrajectoryError(str(error)) from error
+        raise ReferenceTrajectoryError(f"solution file {error}") from error
     if str(solution.scenario_id) not in (scene.id, str(scene.scenario.scenario_id)):
         raise ReferenceTrajectoryError(f"{path} is a solution for {solution.scenario_id}, not for {scene.id}")
     matching = [
