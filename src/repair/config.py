@@ -452,6 +452,9 @@ def _validated(merged: Any) -> Config:
     for key, value in values.items():
         if isinstance(value, float) and not isfinite(value):
             raise ConfigError(f"configuration key {key!r} is {value}; it must be a finite number")
+        # OmegaConf lets a list stand for a number inside of a list.
+        if isinstance(value, list) and not all(isinstance(v, float) and abs(v) <= 50.0 for v in value):
+            raise ConfigError(f"configuration key {key!r} is {value}; it must be numbers from -50 to 50")
     for key, (low, high) in RANGES.items():
         value = values[key]
         if value is not None and not low <= value <= high:

@@ -496,6 +496,8 @@ def test_solution_files(found: RepairResult, tmp_path: Path) -> None:
         ("scene: {vehicle: car}", "'scene.vehicle'"),
         ("search: {delta_t: .nan}", "'search.delta_t'"),
         ("a: ${", "."),
+        ("repair: {relax: [[1]]}", "'repair.relax'"),
+        ("repair: {relax: [.nan]}", "'repair.relax'"),
         ("reference: {source: 7}", "'reference.source'"),
         ("\x00", "cannot be read"),
         ("[" * 3000, "cannot be read"),
