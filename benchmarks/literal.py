@@ -653,15 +653,14 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     pairs = make_pairs(problem, stages.reference, p, dt)
     bounds = bounds_of(problem, ego)
     weights, again = ego.deform, ego.refine
-    costs: dict[str, Any] = {}
+    costs: list[Any] = []
 
     class Spy(fast.EgoBackend):
-        def _lbfgs(self, cost: Any, y0: Any) -> Any:
-            costs[type(cost).__name__] = (cost, y0)
-            return super()._lbfgs(cost, y0)
+        def _minimise(self, cost: Any, *arguments: Any) -> Any:
+            costs.append(cost)
+            return super()._minimise(cost, *arguments)
 
-    spy = Spy(ego, degree=p, spacing=dt)
-    spy.solve(problem)
+    Spy(ego, degree=p, spacing=dt).solve(problem)
     times = {
         "literal J": best_of(
             lambda: deformation_cost(
@@ -674,10 +673,9 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
             ), 5, 5,
         ),
     }  # fmt: skip
-    for label, name in (("package J", "_Cost"), ("package J'", "_RefineCost")):
-        if name in costs:
-            cost, y = costs[name]
-            times[label] = best_of(lambda cost=cost, y=y: cost(y), 5, 200)
+    for label, cost in zip(("package J", "package J'"), (costs[0], costs[-1]), strict=True):
+        u = np.zeros(cost.size)
+        times[label] = best_of(lambda cost=cost, u=u: cost(u), 5, 200)
     return times
 
 

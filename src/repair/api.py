@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +74,7 @@ class Prepared:
     notes: tuple[str, ...]
     phases: dict[str, float]
 
-    @property
+    @cached_property
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
         return ProblemFactory(

@@ -121,8 +121,9 @@ class EgoConfig:
     elastic: float = 0.95  # the paper's lambda
     joint: float = 1.5  # c_j as a multiple of c_m
     reverse: float = 200.0  # weight of speeds below zero, not scaled by lambda_d: no limit of the paper
-    max_iterations: int = 100  # of L-BFGS, in each stage (100 in the paper)
-    tolerance: float = 0.01  # of L-BFGS, on the gradient (0.01 in the paper)
+    solver: str = "newton"  # two ways to the same minimum
+    max_iterations: int = 100  # in each stage (100 in the paper, of L-BFGS)
+    tolerance: float = 0.01  # on the gradient (0.01 in the paper)
     rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
     precondition: bool = True  # L-BFGS with the quadratic part made round: same optimum, faster
     guard: bool = True  # keep the deformed curve where refining it would bring back a collision
@@ -205,6 +206,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "driver": ("f_ttr", "at_ttr"),
     "search.rule": ("bisect", "as_printed", "scan"),
     "search.sides": ("best", "first"),
+    "ego.solver": ("newton", "lbfgs"),
     "scene.after_prediction": ("remove", "hold", "constant_velocity"),
     "reference.source": ("planner", "constant", "accelerate", "recorded", "file"),
     "reference.awareness": ("none", "constant_velocity"),

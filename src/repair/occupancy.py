@@ -160,12 +160,14 @@ def relevant(
     """
     if not len(occupancy):
         return occupancy
-    first = max(int(np.searchsorted(occupancy.t, t_start + 1e-9, side="right")) - 1, 0)
-    last = int(np.searchsorted(occupancy.t, t_end - 1e-9, side="left"))
-    lower, upper = occupancy.lower[:, first : last + 1], occupancy.upper[:, first : last + 1]
-    # Between two steps a box stays within what both of them span (NaN: it is not there).
-    lower = np.concatenate([lower, np.minimum(lower[:, :-1], lower[:, 1:])], axis=1)
-    upper = np.concatenate([upper, np.maximum(upper[:, :-1], upper[:, 1:])], axis=1)
-    near = (upper[..., 0] > reach[0]) & (lower[..., 0] < reach[1])
-    near &= (upper[..., 1] > l_room[0]) & (lower[..., 1] < l_room[1])
-    return occupancy.select(near.any(axis=1))
+    last_step = len(occupancy.t) - 1
+    first = max(int(occupancy.t.searchsorted(t_start + 1e-9, side="right")) - 1, 0)
+    last = min(int(occupancy.t.searchsorted(t_end - 1e-9, side="left")), last_step)
+    # Between two steps a box stays within what both of them span.
+    lower, upper = occupancy.swept if last > first else (occupancy.lower, occupancy.upper)
+    steps = slice(first, max(last, first + 1))
+    near = (upper[:, steps, 0] > reach[0]) & (lower[:, steps, 0] < reach[1])
+    near &= upper[:, steps, 1] > l_room[0]
+    near &= lower[:, steps, 1] < l_room[1]
+    kept = near.any(axis=1)
+    return occupancy if kept.all() else occupancy.select(kept)

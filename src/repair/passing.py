@@ -11,6 +11,8 @@ limits; it shows that a way is open, and a backend makes a trajectory of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,39 +38,53 @@ _DELAYS = (0.0, 1.5, 3.0)
 _HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
 
 
-@dataclass(frozen=True)
-class _Rollouts:
-    """Speed profiles (P, K): position, speed and acceleration over the guide's times."""
+class _Rollouts(NamedTuple):
+    """Speed profiles over the guide's times.
+
+    Position, speed and acceleration (P, K), costs (P,), and how far back and forth any of them gets (K,).
+    """
 
     s: Array
     v: Array
     a: Array
     cost: Array
+    least: Array
+    most: Array
+
+
+@lru_cache(maxsize=64)
+def _family(a_min: float, a_max: float, duration: float) -> tuple[Array, Array, Array, Array]:
+    """Delay, rate, share of the start speed and gain of every profile, (P, 1) each.
+
+    A profile holds the speed v0 for the delay, then changes it at the rate to share * v0 + gain.
+    """
+    family = [(0.0, 1.0, 1.0, 0.0)]  # to the speed that it has: no change
+    family += [(0.0, share * a_min, hold, 0.0) for share in _BRAKING for hold in _HOLD]
+    family += [
+        (delay, share * a_max, 1.0, gain)
+        for share in _THROTTLE
+        for gain in (2.0, 5.0, 50.0)
+        for delay in _DELAYS
+        if delay < duration
+    ]
+    delay, rate, share, gain = (frozen(column[:, None]) for column in np.array(family).T)
+    return delay, rate, share, gain
 
 
 def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
-    top = max(limits.v_max, v0)
-    family = [(0.0, 0.0, v0)]  # (delay, rate, target)
-    family += [(0.0, share * limits.a_min, hold * v0) for share in _BRAKING for hold in _HOLD]
-    family += [
-        (delay, share * limits.a_max, min(v0 + gain, top))
-        for share in _THROTTLE
-        for gain in (2.0, 5.0, 50.0)
-        for delay in _DELAYS
-        if delay < tau[-1]
-    ]
-    delay, rate, target = (column[:, None] for column in np.array(family).T)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        change = np.where(rate == 0.0, 0.0, (target - v0) / np.where(rate == 0.0, 1.0, rate))
-    ramp = np.clip(tau - delay, 0.0, change)
-    s = s0 + v0 * tau + 0.5 * rate * ramp**2 + (target - v0) * np.maximum(tau - delay - change, 0.0)
+    delay, rate, share, gain = _family(limits.a_min, limits.a_max, float(tau[-1]))
+    target = np.minimum(share * v0 + gain, max(limits.v_max, v0))
+    change = (target - v0) / rate
+    since = tau - delay
+    ramp = np.minimum(np.maximum(since, 0.0), change)
+    s = (s0 + v0 * tau) + (0.5 * rate) * (ramp * ramp) + (target - v0) * np.maximum(since - change, 0.0)
     v = v0 + rate * ramp
-    a = np.where((tau >= delay) & (tau < delay + change), rate, 0.0)
-    loss = (s[:1, -1] - s[:, -1]) / max(tau[-1], 1.0)
-    cost = np.mean(a**2, axis=1) + 0.01 * loss**2
-    return _Rollouts(s, v, a, cost)
+    a = rate * ((since >= 0.0) & (since < change))
+    loss = (s[0, -1] - s[:, -1]) / max(tau[-1], 1.0)
+    cost = np.einsum("pk,pk->p", a, a) / len(tau) + 0.01 * loss**2
+    return _Rollouts(s, v, a, cost, s.min(axis=0), s.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -99,14 +115,15 @@ def _quintic(start: Array, target: float, duration: float, tau: Array) -> tuple[
     return position, np.where(moving, rate, 0.0), np.where(moving, acceleration, 0.0)
 
 
-def _conflict(occupancy: Occupancy, lower: Array, upper: Array, s: Array, l: Array) -> tuple[int, int] | None:  # noqa: E741
-    """First (time index, obstacle) whose box the path (s, l) enters."""
-    inside = (lower[..., 0] < s) & (s < upper[..., 0]) & (lower[..., 1] < l) & (l < upper[..., 1])
-    hit = inside.any(axis=0)
-    if not hit.any():
+def _conflict(lower: Array, upper: Array, path: Array) -> tuple[int, int] | None:
+    """First (time index, obstacle) whose box the path (K, 2) enters."""
+    inside = (lower < path) & (path < upper)
+    hit = inside[..., 0] & inside[..., 1]
+    times = hit.any(axis=0)
+    if not times.any():
         return None
-    k = int(np.argmax(hit))
-    return k, int(np.argmax(inside[:, k]))
+    k = int(times.argmax())
+    return k, int(hit[:, k].argmax())
 
 
 def _lateral_profiles(
@@ -191,45 +208,36 @@ def open_passings(
     """
     tau = reference.t - reference.t[0]
     lower, upper = occupancy.at(reference.t)
-    conflict = _conflict(occupancy, lower, upper, reference.position[:, 0], reference.position[:, 1])
+    conflict = _conflict(lower, upper, reference.position)
     profiles = _lateral_profiles(
         start, tau, reference, lower, upper, conflict, limits, bounds, margin + 0.05, lateral
     )
     speeds = _speed_profiles(start, tau, limits)
     # Braking in a bend is bound by the friction circle; a guide leaves a tenth of it.
-    bend = np.abs(speeds.v**2 * np.interp(speeds.s, *curvature))
-    excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat).max(
-        axis=1
-    )
-    excess = np.maximum(excess, 0.0)
+    bend = np.abs(np.interp(speeds.s, *curvature)) * (speeds.v * speeds.v)
+    usable = bend.max(axis=1) <= 0.9 * limits.a_lat
+    usable &= (bend * bend + speeds.a * speeds.a).max(axis=1) <= (0.9 * limits.a_total) ** 2
+    wide_lower, wide_upper = lower - margin, upper + margin
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
-    closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
+    shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]] = []
     for profile in profiles:
-        overlap = (lower[..., 1] - margin < profile.l) & (profile.l < upper[..., 1] + margin)
-        met = np.flatnonzero(overlap.any(axis=1))
-        behind = lower[met, :, 0] - margin - speeds.s[:, None, :]
-        ahead = speeds.s[:, None, :] - upper[met, :, 0] - margin
-        depth = np.where(overlap[met], np.minimum(-behind, -ahead), 0.0).max(axis=(1, 2), initial=0.0)
-        free = (depth <= 0.0) & (excess <= 0.0)
+        overlap = (wide_lower[..., 1] < profile.l) & (profile.l < wide_upper[..., 1])
+        free = usable & ~_entered(speeds, overlap, wide_lower[..., 0], wide_upper[..., 0])
         cost = speeds.cost + profile.cost
-        for maneuver, members in _kinds(profile, conflict, overlap, met, ahead, speeds).items():
-            usable = np.flatnonzero(free & members)
-            if len(usable):
-                p = int(usable[np.argmin(cost[usable])])
+        for maneuver, members in _kinds(profile, conflict, overlap, wide_upper, speeds).items():
+            open_ = (free & members).nonzero()[0]
+            if len(open_):
+                p = int(open_[np.argmin(cost[open_])])
                 if maneuver not in best or cost[p] < best[maneuver][0]:
                     best[maneuver] = (float(cost[p]), p, profile)
             elif members.any():
-                badness = np.where(members, 10.0 * depth + excess, np.inf)
-                p = int(np.argmin(badness))
-                if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
-                    closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
+                shut.append((profile, maneuver, members))
     wanted: list[Maneuver | None] = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
     if not best:
         wanted += [Maneuver.LEFT, Maneuver.RIGHT]
-    for kind in wanted:
-        if kind in closest:
-            badness_, p, profile, maneuver = closest[kind]
-            best[maneuver] = (1e3 + badness_, p, profile)
+    if wanted:
+        excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat)
+        best |= _closest(speeds, shut, wanted, np.maximum(excess.max(axis=1), 0.0), wide_lower, wide_upper)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
         for maneuver, (cost, p, profile) in best.items()
@@ -237,22 +245,53 @@ def open_passings(
     return tuple(sorted(passings, key=lambda x: x.cost))
 
 
+def _entered(
+    speeds: _Rollouts, overlap: npt.NDArray[np.bool_], lower: Array, upper: Array
+) -> npt.NDArray[np.bool_]:
+    """Which speed profiles (P,) enter a box (N, K) at a time at which they overlap it sideways."""
+    obstacle, k = (overlap & (lower < speeds.most) & (upper > speeds.least)).nonzero()
+    s = speeds.s.take(k, axis=1)
+    inside = (s > lower[obstacle, k]) & (s < upper[obstacle, k])
+    return np.asarray(inside.any(axis=1))
+
+
+def _closest(
+    speeds: _Rollouts,
+    shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]],
+    wanted: list[Maneuver | None],
+    excess: Array,
+    lower: Array,
+    upper: Array,
+) -> dict[Maneuver, tuple[float, int, _LateralProfile]]:
+    """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
+    closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
+    for profile, maneuver, members in shut:
+        if profile.maneuver not in wanted:
+            continue
+        overlap = (lower[..., 1] < profile.l) & (profile.l < upper[..., 1])
+        met = overlap.any(axis=1)
+        inside = np.minimum(speeds.s[:, None] - lower[met, :, 0], upper[met, :, 0] - speeds.s[:, None])
+        depth = np.where(overlap[met], inside, 0.0).max(axis=(1, 2), initial=0.0)
+        badness = np.where(members, 10.0 * depth + excess, np.inf)
+        p = int(np.argmin(badness))
+        if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
+            closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
+    found = (closest[kind] for kind in wanted if kind in closest)
+    return {maneuver: (1e3 + badness, p, profile) for badness, p, profile, maneuver in found}
+
+
 def _kinds(
     profile: _LateralProfile,
     conflict: tuple[int, int] | None,
     overlap: npt.NDArray[np.bool_],
-    met: npt.NDArray[np.intp],
-    ahead: Array,
+    upper: Array,
     speeds: _Rollouts,
 ) -> dict[Maneuver, npt.NDArray[np.bool_]]:
     """Which speed profiles (P,) count as which manoeuvre."""
-    if profile.maneuver is not None or conflict is None:
+    if profile.maneuver is not None or conflict is None or not overlap[conflict[1]].any():
         return {profile.maneuver or Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
     j = conflict[1]
-    where = np.flatnonzero(met == j)
-    if not len(where):
-        return {Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
-    passed = ((ahead[:, where[0]] > 0.0) & overlap[j]).any(axis=1)
+    passed = ((speeds.s > upper[j, :, 0]) & overlap[j]).any(axis=1)
     return {Maneuver.YIELD: ~passed, Maneuver.GO_AHEAD: passed}
 
 
@@ -266,13 +305,12 @@ def _passing(
     lower: Array,
     upper: Array,
 ) -> Passing:
-    guide = FrenetTrajectory(
-        frozen(times),
-        frozen(np.column_stack([speeds.s[p], profile.l])),
-        frozen(np.column_stack([speeds.v[p], profile.rate])),
-        frozen(np.column_stack([speeds.a[p], profile.acceleration])),
-        frozen(np.zeros((len(times), 2))),
-    )
+    columns = np.zeros((4, len(times), 2))
+    columns[0, :, 0], columns[0, :, 1] = speeds.s[p], profile.l
+    columns[1, :, 0], columns[1, :, 1] = speeds.v[p], profile.rate
+    columns[2, :, 0], columns[2, :, 1] = speeds.a[p], profile.acceleration
+    columns.setflags(write=False)
+    guide = FrenetTrajectory(times, *columns)
     return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost)
 
 
@@ -280,17 +318,12 @@ def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8
     """Side (N, K) that a collision-free path (K, 2) takes of each box.
 
     Where the path is clear on one axis only, that axis decides; where it is clear on both, the
-    larger distance does.
+    larger distance does. Where a box is not there it counts as ahead of the path.
     """
-    room = np.stack(
-        [
-            lower[..., 0] - position[:, 0],
-            position[:, 0] - upper[..., 0],
-            position[:, 1] - upper[..., 1],
-            lower[..., 1] - position[:, 1],
-        ]
-    )
-    present = np.isfinite(room).all(axis=0)
-    side: npt.NDArray[np.int8] = np.argmax(np.where(present, room, -np.inf), axis=0).astype(np.int8)
-    assert (Side.BEHIND, Side.AHEAD, Side.LEFT, Side.RIGHT) == (0, 1, 2, 3)
+    before, after = lower - position, position - upper
+    along, across = np.maximum(before, after).transpose(2, 0, 1)
+    ahead, left = after[..., 0] > before[..., 0], after[..., 1] >= before[..., 1]
+    # in the order of Side: behind, ahead, left, right
+    side = np.where(across > along, 3 - left.view(np.int8), ahead.view(np.int8))
+    side[~np.isfinite(along + across)] = Side.BEHIND
     return side

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -175,24 +176,34 @@ class Occupancy:
 
     def at(self, times: npt.ArrayLike) -> tuple[Array, Array]:
         """Boxes (N, K, 2) at ``times`` (K,); NaN where an obstacle is absent or the time is outside."""
-        query = np.asarray(times, dtype=np.float64)
         step = self.t[1] - self.t[0] if len(self.t) > 1 else 1.0
-        where = (query - self.t[0]) / step
+        where = (np.asarray(times, dtype=np.float64) - self.t[0]) / step
         nearest = np.rint(where)
-        where = np.where(np.abs(where - nearest) < 1e-6, nearest, where)
-        low = np.clip(np.floor(where), 0, len(self.t) - 1).astype(np.intp)
-        # On a step its own row counts alone: the next one may be NaN.
-        high = np.where(where > low, np.minimum(low + 1, len(self.t) - 1), low)
-        weight = (where - low)[:, None]
-        outside = (where < 0) | (where > len(self.t) - 1)
-        lower, upper = self.lower[:, low], self.upper[:, low]
-        if (high != low).any():
-            lower = lower + weight * (self.lower[:, high] - lower)
-            upper = upper + weight * (self.upper[:, high] - upper)
+        on_step = np.abs(where - nearest) < 1e-6
+        every = bool(on_step.all())
+        where = nearest if every else np.where(on_step, nearest, where)
+        last = len(self.t) - 1
+        low = np.clip(np.floor(where), 0, last).astype(np.intp)
+        lower, upper = self.lower.take(low, axis=1), self.upper.take(low, axis=1)
+        if not every:
+            # On a step its own row counts alone: the next one may be NaN.
+            high = np.where(on_step, low, np.minimum(low + 1, last))
+            weight = (where - low)[:, None]
+            lower += weight * (self.lower.take(high, axis=1) - lower)
+            upper += weight * (self.upper.take(high, axis=1) - upper)
+        outside = (where < 0) | (where > last)
         if outside.any():
             lower[:, outside] = np.nan
             upper[:, outside] = np.nan
         return lower, upper
+
+    @cached_property
+    def swept(self) -> tuple[Array, Array]:
+        """Corners (N, T - 1, 2) of what each box spans between two steps; NaN where it is at neither."""
+        return (
+            np.fmin(self.lower[:, :-1], self.lower[:, 1:]),
+            np.fmax(self.upper[:, :-1], self.upper[:, 1:]),
+        )
 
     def select(self, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Occupancy:
         """The obstacles that ``keep`` names."""

@@ -1,4 +1,4 @@
-"""The paper's penalty functions (Sec. IV-C, IV-D), vectorised, each with its exact gradient.
+"""The paper's penalty functions (Sec. IV-C, IV-D), vectorised, with their first two derivatives.
 
 Both one-sided penalties of the paper, the collision penalty j_c and the feasibility penalty f, are
 one and the same function of an excess e >= 0: the cubic e**3 up to a joint D, continued beyond it
@@ -9,7 +9,7 @@ which fixes the paper's a_1 .. c_2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,63 +18,42 @@ from repair.types import Array
 # Reversing is penalised as 3 D e**2 from this speed [m/s] on: early enough to act as a quadratic.
 REVERSE_JOINT = 0.01
 
-__all__ = ["Feasibility", "cubic_quadratic", "feasibility_bounds"]
+__all__ = ["SoftBounds", "cubic_quadratic", "feasibility_bounds"]
 
 
-def cubic_quadratic(excess: Array, joint: Array | float) -> tuple[Array, Array]:
-    """Penalty and slope of an excess (any shape); zero for ``excess <= 0``.
+def cubic_quadratic(excess: Array, joint: Array | float) -> tuple[Array, Array, Array]:
+    """Penalty, slope and curvature of an excess (any shape); zero for ``excess <= 0``.
 
     Written around the joint without a branch: t = min(e, D) gives
-    t**3 + 3 D**2 (e - t) + 3 D (e - t)**2.
+    t**3 + 3 D (e - t) (D + e - t), the slope 3 t**2 + 6 D (e - t) and the curvature 6 t.
     """
     positive = np.maximum(excess, 0.0)
     cubic = np.minimum(positive, joint)
     rest = positive - cubic
-    square = cubic * cubic
-    value = square * cubic + 3.0 * joint * rest * (joint + rest)
-    slope = 3.0 * square + 6.0 * joint * rest
-    return value, slope
+    square, bend = cubic * cubic, 3.0 * joint * rest
+    return square * cubic + bend * (joint + rest), 3.0 * square + 2.0 * bend, 6.0 * cubic
 
 
-@dataclass(frozen=True)
-class Feasibility:
-    """Stacked bounds of the derivative control points [V; A; J], each row (s, l).
+class SoftBounds(NamedTuple):
+    """Limits of K quantities, each of which is penalised beyond its own.
 
     Attributes
     ----------
-    upper, lower : (R, 2) array
-        Elastic limits lambda c_m (signed) beyond which the penalty starts.
-    upper_joint, lower_joint : (R, 2) array
-        D = c_j - lambda c_m on either side.
-    upper_weight, lower_weight : (R, 2) array
-        w_v, w_a, w_j of the row.
+    limit : (K,) array
+        Where the penalty of a quantity starts.
+    joint : (K,) array
+        D.
+    weight : (K,) array
     """
 
-    upper: Array
-    lower: Array
-    upper_joint: Array
-    lower_joint: Array
-    upper_weight: Array
-    lower_weight: Array
+    limit: Array
+    joint: Array
+    weight: Array
 
-    def columns(self, chosen: int | slice) -> Feasibility:
-        """The bounds of some axes: the first ``chosen`` of them, or a slice."""
-        take = slice(chosen) if isinstance(chosen, int) else chosen
-        return Feasibility(
-            self.upper[:, take], self.lower[:, take], self.upper_joint[:, take], self.lower_joint[:, take],
-            self.upper_weight[:, take], self.lower_weight[:, take],
-        )  # fmt: skip
-
-    def evaluate(self, derivatives: Array) -> tuple[float, Array | None]:
-        """J_d and its gradient with respect to ``derivatives`` (R, 2); None for a gradient of zero."""
-        above = derivatives - self.upper
-        below = self.lower - derivatives
-        if above.max() <= 0.0 and below.max() <= 0.0:
-            return 0.0, None
-        value_up, slope_up = cubic_quadratic(above, self.upper_joint)
-        value_low, slope_low = cubic_quadratic(below, self.lower_joint)
-        value = float(np.vdot(self.upper_weight, value_up) + np.vdot(self.lower_weight, value_low))
-        return value, self.upper_weight * slope_up - self.lower_weight * slope_low
+    def evaluate(self, x: Array) -> tuple[float, Array, Array]:
+        """Sum of the weighted penalties of quantities (K,), and the slope and curvature of each."""
+        value, slope, curvature = cubic_quadratic(x - self.limit, self.joint)
+        return float(self.weight.dot(value)), self.weight * slope, self.weight * curvature
 
 
 def feasibility_bounds(
@@ -85,31 +64,35 @@ def feasibility_bounds(
     elastic: float,
     joint_factor: float,
     reverse_weight: float,
-) -> Feasibility:
-    """Bounds for the derivatives of ``n`` control points.
+) -> tuple[SoftBounds, SoftBounds]:
+    """Bounds of the stacked derivatives x = [V; A; J] of ``n`` control points, and of -x.
 
     Parameters
     ----------
-    maxima, minima : (3, 2) array
+    maxima, minima : (3, axes) array
         c_m of velocity, acceleration and jerk per axis, upper and (signed) lower.
     weights : tuple
         w_v, w_a, w_j.
     elastic : float
-        The paper's lambda < 1.
+        The paper's lambda < 1: the penalty starts at lambda c_m.
     joint_factor : float
         c_j as a multiple of c_m.
     reverse_weight : float
         Weight of longitudinal speeds below zero. The paper bounds |v| only, which lets a repaired
         car reverse; here the lower bound of the longitudinal speed is zero, and not elastic.
+
+    Returns
+    -------
+    tuple of SoftBounds
+        Of (3n - 6, axes) quantities each, not flattened.
     """
     rows = [n - 1, n - 2, n - 3]
-    upper = np.repeat(elastic * maxima, rows, axis=0)
-    lower = np.repeat(elastic * minima, rows, axis=0)
-    upper_joint = np.repeat((joint_factor - elastic) * np.abs(maxima), rows, axis=0)
-    lower_joint = np.repeat((joint_factor - elastic) * np.abs(minima), rows, axis=0)
-    upper_weight = np.repeat(np.outer(weights, np.ones(2)), rows, axis=0)
-    lower_weight = upper_weight.copy()
-    lower[: n - 1, 0] = 0.0
-    lower_joint[: n - 1, 0] = REVERSE_JOINT
-    lower_weight[: n - 1, 0] = reverse_weight
-    return Feasibility(upper, lower, upper_joint, lower_joint, upper_weight, lower_weight)
+    extremes = np.repeat(np.stack((maxima, -minima)), rows, axis=1)
+    limit, joint = elastic * extremes, (joint_factor - elastic) * np.abs(extremes)
+    weight = np.empty_like(joint)
+    weight[:] = np.repeat(weights, rows)[:, None]
+    limit[1, : n - 1, 0] = 0.0
+    joint[1, : n - 1, 0] = REVERSE_JOINT
+    weight[1, : n - 1, 0] = reverse_weight
+    above, below = (SoftBounds(limit[k], joint[k], weight[k]) for k in (0, 1))
+    return above, below

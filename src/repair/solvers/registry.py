@@ -20,7 +20,7 @@ _BACKENDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
         "repair.solvers.ego",
         "make",
         ("scipy",),
-        "soft penalties on a uniform B-spline, deformation and refinement by L-BFGS (the paper)",
+        "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
     ),
     "casadi": (
         "repair.solvers.casadi_nlp",

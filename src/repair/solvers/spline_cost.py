@@ -1,0 +1,260 @@
+"""The cost of both soft stages over the free control points, with gradient and banded Hessian.
+
+J = lambda_s J_s + the penalties of the derivatives' control points and of the {p, v} pairs
++ lambda_f J_f (paper, Sec. IV-C and IV-D). It is convex and twice continuously differentiable, and
+every term couples neighbouring control points only: the Hessian is a band, and value, gradient and
+Newton step cost O(n).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations_with_replacement
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg.blas import dsbmv
+
+from repair.bspline import basis_matrix
+from repair.solvers.penalties import SoftBounds
+from repair.types import Array, frozen
+
+__all__ = ["Point", "SplineCost", "fitting_band"]
+
+_ORDERS = (1, 2, 3)
+_NONE, _NOTHING = np.empty(0, dtype=np.intp), np.empty(0)
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """What depends on numbers of points and axes, spacing and the free points alone.
+
+    Free coordinates are numbered point by point, ``(i - first) * axes + axis``. The band is the lower
+    form of LAPACK, column by column: entry (r, c) with r >= c at ``c * (width + 1) + r - c``.
+    """
+
+    scale: Array  # (3n - 6, 1): 1 / spacing**k of every row
+    smooth: Array  # ((3n - 6) axes,): what J_s makes of every row's square, 2 / spacing**0 on A and J
+    width: int  # of the band
+    band: Array  # ((m axes) * (width + 1),): Hessian of J_s
+    factor: Array  # ((3n - 6) axes, 10): by which a row's curvature is added to the band,
+    where: npt.NDArray[np.intp]  # ((3n - 6) axes * 10,): and to which of its entries
+
+
+@lru_cache(maxsize=128)
+def _structure(n: int, axes: int, first: int, last: int, spacing: float, width: int) -> _Structure:
+    size = (last - first) * axes
+    rows = sum(n - k for k in _ORDERS)
+    where, factor = np.zeros((rows, axes, 10), dtype=np.intp), np.zeros((rows, axes, 10))
+    row = 0
+    for k in _ORDERS:
+        stencil = [(-1.0) ** (k - q) * comb(k, q) / spacing**k for q in range(k + 1)]
+        pairs = list(combinations_with_replacement(range(k + 1), 2))
+        for i in range(n - k):
+            for slot, (low, high) in enumerate(pairs):
+                if first <= i + low and i + high < last:
+                    column = (i + low - first) * axes + np.arange(axes)
+                    where[row, :, slot] = column * (width + 1) + (high - low) * axes
+                    factor[row, :, slot] = stencil[low] * stencil[high]
+            row += 1
+    scale = np.concatenate([np.full((n - k, 1), spacing**-k) for k in _ORDERS])
+    smooth = np.repeat([0.0, 2.0, 2.0], [(n - k) * axes for k in _ORDERS])
+    factors = frozen(factor.reshape(-1, 10))
+    band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
+    return _Structure(frozen(scale), frozen(smooth), width, frozen(band), factors, where.ravel())
+
+
+class Point(NamedTuple):
+    """The cost at one place: value, gradient, and the penalties' curvatures."""
+
+    value: float
+    gradient: Array
+    curvature: Array
+
+
+class SplineCost:
+    """A stage's cost over the displacements u of its free control points, flattened (m * axes,).
+
+    Parameters
+    ----------
+    points : (n, axes) array
+        Control points at u = 0; those before ``first`` and from ``last`` on are fixed.
+    first, last : int
+    spacing : float
+        Knot spacing [s].
+    smooth : float
+        lambda_s.
+    bounds : SoftBounds
+        Of x, of -x and of ``sign`` times the paired coordinates, with x the (3n - 6) * axes stacked
+        derivatives.
+    paired : (P,) int array
+        ``point * axes + axis`` of every {p, v} pair, all of free points.
+    sign : (P,) array
+    fit : (width + 1, m * axes) array, optional
+        Band (lower form) of the fitting term's Hessian; its minimum lies at u = 0.
+    constant : float
+        Added to the value.
+    """
+
+    def __init__(
+        self,
+        points: Array,
+        first: int,
+        last: int,
+        spacing: float,
+        smooth: float,
+        bounds: SoftBounds,
+        paired: npt.NDArray[np.intp] = _NONE,
+        sign: Array = _NOTHING,
+        fit: Array | None = None,
+        constant: float = 0.0,
+    ) -> None:
+        n, axes = points.shape
+        width = 3 * axes if fit is None else max(3 * axes, len(fit) - 1)
+        self.axes, self.size, self.free = axes, (last - first) * axes, slice(first, last)
+        made = self._structure = _structure(n, axes, first, last, spacing, width)
+        self._points, self._paired, self._sign = points, paired, sign
+        self._bounds, self._fit, self._constant = bounds, fit, constant
+        self._coordinate = paired - first * axes  # of every pair, in u
+        self._rows = rows = len(made.smooth)
+        self._weights = smooth * made.smooth
+        self._band = smooth * made.band
+        if fit is not None:
+            self._band.reshape(self.size, width + 1)[:, : len(fit)] += fit.T
+        # Buffers, made once for all evaluations, and the views that these need.
+        self._moved, self._pull = np.zeros((2, n, axes))
+        self._free, self._free_pull = self._moved[first:last], self._pull[first:last]
+        self._quantities = np.empty(2 * rows + len(paired))
+        self._stack, self._slope = self._quantities[:rows].reshape(-1, axes), np.empty((rows // axes, axes))
+        cuts = ((0, n - 1), (n - 1, 2 * n - 3), (2 * n - 3, 3 * n - 6))
+        self._parts = [self._stack[a:b] for a, b in cuts]
+        self._slopes = [self._slope[a:b] for a, b in cuts]
+        origin = self._measure(points).copy()
+        self._derivatives = origin[:rows]
+        self._reduced = bounds._replace(limit=bounds.limit - origin)
+
+    def points(self, u: Array) -> Array:
+        """Control points (n, axes) at the displacements u."""
+        self._free[:] = u.reshape(self._free.shape)
+        return self._points + self._moved
+
+    def _measure(self, points: Array) -> Array:
+        """What is bounded, of control points (n, axes): x, -x and the paired coordinates (a buffer)."""
+        v, a, j = self._parts
+        np.subtract(points[1:], points[:-1], out=v)
+        np.subtract(v[1:], v[:-1], out=a)
+        np.subtract(a[1:], a[:-1], out=j)
+        self._stack *= self._structure.scale
+        found, rows = self._quantities, self._rows
+        np.negative(found[:rows], out=found[rows : 2 * rows])
+        np.multiply(points.ravel()[self._paired], self._sign, out=found[2 * rows :])
+        return found
+
+    def __call__(self, u: Array) -> Point:
+        """Value, gradient and curvatures at u."""
+        rows = self._rows
+        self._free[:] = u.reshape(self._free.shape)
+        moved = self._measure(self._moved)
+        penalty, slope, curvature = self._reduced.evaluate(moved)
+        x = self._derivatives + moved[:rows]
+        bent = self._weights * x
+        value = self._constant + 0.5 * float(bent.dot(x)) + penalty
+        bent += slope[:rows]
+        bent -= slope[rows : 2 * rows]
+        gradient = self._pulled_back(bent)
+        if len(self._paired):
+            gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
+        if self._fit is not None:
+            pull = dsbmv(len(self._fit) - 1, 1.0, self._fit, u, lower=1)
+            value += 0.5 * float(pull.dot(u))
+            gradient += pull
+        return Point(value, gradient, curvature)
+
+    def _pulled_back(self, slopes: Array) -> Array:
+        """The transpose of the differences in :meth:`_measure`, applied to the slopes of x."""
+        np.multiply(slopes.reshape(self._slope.shape), self._structure.scale, out=self._slope)
+        v, a, j = self._slopes
+        a[:-1] -= j
+        a[1:] += j
+        v[:-1] -= a
+        v[1:] += a
+        self._pull[0] = 0.0
+        self._pull[1:] = v
+        self._pull[:-1] -= v
+        return self._free_pull.flatten()
+
+    def quadratic(self) -> Array:
+        """Band of the Hessian where no penalty is active; see :meth:`hessian`."""
+        return self._band.reshape(self.size, -1).T
+
+    def hessian(self, point: Point) -> Array:
+        """Band (width + 1, m * axes) of the Hessian at an evaluated point, in lower form."""
+        made, rows = self._structure, self._rows
+        curvature = point.curvature[:rows] + point.curvature[rows : 2 * rows]
+        band = self._band
+        if curvature.any():
+            added = made.factor * curvature[:, None]
+            band = band + np.bincount(made.where, added.ravel(), len(band))
+        if len(self._paired):
+            entry = self._coordinate * (made.width + 1)
+            band = band + np.bincount(entry, point.curvature[2 * rows :], len(band))
+        return band.reshape(self.size, -1).T
+
+
+@lru_cache(maxsize=128)
+def _knots(n: int, degree: int, spacing: float) -> tuple[Array, npt.NDArray[np.intp], Array]:
+    """How a knot sees the ``degree`` control points that are alive there.
+
+    Returns the derivatives of their basis functions (p,), for every free point the knots that see it
+    (m, p), and the products (p, p of d) of the basis functions of two points d apart.
+    """
+    p = degree
+    values, rates = (basis_matrix([0.0], p + 1, p, spacing, order)[0, :p] for order in (0, 1))
+    products = np.zeros((p, p))
+    for d in range(p):
+        products[: p - d, d] = values[: p - d] * values[d:]
+    knots = np.arange(p, n - p)[:, None] - np.arange(p)
+    return frozen(rates), knots, frozen(products)
+
+
+def fitting_band(points: Array, degree: int, spacing: float, weight: float, axes: int) -> Array:
+    """Band of the Hessian of lambda_f J_f in the free control points, around the deformed curve.
+
+    J_f sums over the knots the displacement from the deformed curve, split along its direction of
+    travel (axial, divided by 5) and across it: d_a**2 / 25 + d_r**2 (EGO-Planner, eq. 12-13).
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Of the deformed curve; the first and the last ``degree`` of them are fixed.
+
+    Returns
+    -------
+    (degree * axes, m * axes) array
+        Lower form, coordinates numbered point by point; entries beyond the matrix are of no meaning.
+    """
+    p, count = degree, len(points) - degree + 1
+    rates, knots, products = _knots(len(points), p, spacing)
+    velocity = rates[0] * points[:count]
+    for q in range(1, p):
+        velocity += rates[q] * points[q : q + count]
+    v_s, v_l = velocity.T
+    square = v_s * v_s + v_l * v_l
+    # A standing curve has no direction of its own; the lane's is taken.
+    standing = square <= 1e-6
+    if standing.any():
+        square[standing] = np.inf
+    turned = (2.0 * weight * (1.0 - 1.0 / 25.0)) * v_l / square
+    across = turned * v_l
+    ss = (2.0 * weight / 25.0 + across)[knots] @ products  # (m, p): point, distance of the other one
+    if axes == 1:
+        return np.asarray(ss.T)
+    ll = (2.0 * weight - across)[knots] @ products
+    sl = (-turned * v_s)[knots] @ products
+    band = np.zeros((len(ss), 2, 2 * p))
+    band[:, 0, 0::2], band[:, 0, 1::2] = ss, sl
+    band[:, 1, 0::2], band[:, 1, 1:-1:2] = ll, sl[:, 1:]
+    return band.reshape(2 * len(ss), -1).T
