@@ -197,9 +197,11 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     """
     tau, operator, correction = _fit_operator(n, degree, spacing, 4)
     samples = curve.sample(t_start + tau)
-    state = np.zeros((degree, 2))
-    known = (samples.position[0], samples.velocity[0], samples.acceleration[0], samples.jerk[0])
-    state[: min(4, degree)] = known[: min(4, degree)]
-    head = splice_points(state, degree, spacing)
-    tail = operator @ samples.position - correction @ head
-    return UniformBSpline(t_start, spacing, degree, frozen(np.vstack([head, tail])))
+    state = np.zeros((max(degree, 4), 2))
+    for row, column in enumerate((samples.position, samples.velocity, samples.acceleration, samples.jerk)):
+        state[row] = column[0]
+    points = np.empty((n, 2))
+    head = points[:degree] = splice_points(state[:degree], degree, spacing)
+    points[degree:] = operator @ samples.position - correction @ head
+    points.setflags(write=False)
+    return UniformBSpline(t_start, spacing, degree, points)

@@ -52,12 +52,23 @@ class _Rollouts(NamedTuple):
     most: Array
 
 
-@lru_cache(maxsize=64)
-def _family(a_min: float, a_max: float, duration: float) -> tuple[Array, Array, Array, Array]:
-    """Delay, rate, share of the start speed and gain of every profile, (P, 1) each.
+class _Family(NamedTuple):
+    """Rate, share of the start speed and gain of every profile, (P, 1) each, and the time since it began.
 
-    A profile holds the speed v0 for the delay, then changes it at the rate to share * v0 + gain.
+    A profile holds the speed v0 for a delay, then changes it at the rate to share * v0 + gain.
     """
+
+    rate: Array
+    share: Array
+    gain: Array
+    begun: npt.NDArray[np.bool_]  # (P, K)
+    since: Array  # (P, K), 0 before it
+
+
+@lru_cache(maxsize=64)
+def _family(a_min: float, a_max: float, count: int, step: float) -> _Family:
+    """All profiles over ``count`` samples, ``step`` apart."""
+    tau = step * np.arange(count)
     family = [(0.0, 1.0, 1.0, 0.0)]  # to the speed that it has: no change
     family += [(0.0, share * a_min, hold, 0.0) for share in _BRAKING for hold in _HOLD]
     family += [
@@ -65,26 +76,34 @@ def _family(a_min: float, a_max: float, duration: float) -> tuple[Array, Array, 
         for share in _THROTTLE
         for gain in (2.0, 5.0, 50.0)
         for delay in _DELAYS
-        if delay < duration
+        if delay < tau[-1]
     ]
     delay, rate, share, gain = (frozen(column[:, None]) for column in np.array(family).T)
-    return delay, rate, share, gain
+    return _Family(rate, share, gain, tau >= delay, frozen(np.maximum(tau - delay, 0.0)))
 
 
 def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
-    delay, rate, share, gain = _family(limits.a_min, limits.a_max, float(tau[-1]))
-    target = np.minimum(share * v0 + gain, max(limits.v_max, v0))
-    change = (target - v0) / rate
-    since = tau - delay
-    ramp = np.minimum(np.maximum(since, 0.0), change)
-    s = (s0 + v0 * tau) + (0.5 * rate) * (ramp * ramp) + (target - v0) * np.maximum(since - change, 0.0)
-    v = v0 + rate * ramp
-    a = rate * ((since >= 0.0) & (since < change))
-    loss = (s[0, -1] - s[:, -1]) / max(tau[-1], 1.0)
-    cost = np.einsum("pk,pk->p", a, a) / len(tau) + 0.01 * loss**2
-    return _Rollouts(s, v, a, cost, s.min(axis=0), s.max(axis=0))
+    duration = max(float(tau[-1]), 1e-9)
+    step = round(duration / max(len(tau) - 1, 1), 9)
+    rate, share, gain, begun, since = _family(limits.a_min, limits.a_max, len(tau), step)
+    rise = np.minimum(share * v0 + gain, max(limits.v_max, v0)) - v0
+    change = rise / rate
+    ramp = np.minimum(since, change)
+    # v0 tau + rate ramp^2 / 2 + rise (since - ramp)
+    s = (0.5 * rate) * ramp
+    s -= rise
+    s *= ramp
+    s += rise * since
+    s += s0 + v0 * tau
+    ramp *= rate
+    ramp += v0
+    a = rate * (begun & (since < change))
+    # mean square of the acceleration, and the way that is lost
+    loss = (s[0, -1] - s[:, -1]) / max(duration, 1.0)
+    cost = rate[:, 0] * (ramp[:, -1] - v0) / duration + 0.01 * loss**2
+    return _Rollouts(s, ramp, a, cost, s.min(axis=0), s.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -325,5 +344,5 @@ def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8
     ahead, left = after[..., 0] > before[..., 0], after[..., 1] >= before[..., 1]
     # in the order of Side: behind, ahead, left, right
     side = np.where(across > along, 3 - left.view(np.int8), ahead.view(np.int8))
-    side[~np.isfinite(along + across)] = Side.BEHIND
+    side[~np.isfinite(along + across)] = int(Side.BEHIND)
     return side

@@ -167,7 +167,7 @@ def _probe(
         nothing = SolveResult(SolveStatus.INFEASIBLE, detail="no manoeuvre past the obstacles is open")
         why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
         return Probe(t_rep, nothing, Verdict((why,)))
-    return replace(best, tried=tuple(tried))
+    return Probe(t_rep, best.solve, best.verdict, best.maneuver, best.check_time, tuple(tried), best.margin)
 
 
 def _better(new: Probe, old: Probe) -> bool:

@@ -183,14 +183,14 @@ class Occupancy:
         every = bool(on_step.all())
         where = nearest if every else np.where(on_step, nearest, where)
         last = len(self.t) - 1
-        low = np.clip(np.floor(where), 0, last).astype(np.intp)
-        lower, upper = self.lower.take(low, axis=1), self.upper.take(low, axis=1)
+        low = np.floor(where).astype(np.intp)
+        lower, upper = (box.take(low, axis=1, mode="clip") for box in (self.lower, self.upper))
         if not every:
             # On a step its own row counts alone: the next one may be NaN.
-            high = np.where(on_step, low, np.minimum(low + 1, last))
+            high = np.where(on_step, low, low + 1)
             weight = (where - low)[:, None]
-            lower += weight * (self.lower.take(high, axis=1) - lower)
-            upper += weight * (self.upper.take(high, axis=1) - upper)
+            lower += weight * (self.lower.take(high, axis=1, mode="clip") - lower)
+            upper += weight * (self.upper.take(high, axis=1, mode="clip") - upper)
         outside = (where < 0) | (where > last)
         if outside.any():
             lower[:, outside] = np.nan
@@ -207,7 +207,10 @@ class Occupancy:
 
     def select(self, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Occupancy:
         """The obstacles that ``keep`` names."""
-        return Occupancy(self.t, self.ids[keep], self.lower[keep], self.upper[keep], self.static[keep])
+        rows = np.arange(len(self))[keep]
+        return Occupancy(
+            self.t, self.ids[rows], self.lower.take(rows, axis=0), self.upper.take(rows, axis=0), self.static[rows]
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -256,8 +259,8 @@ class Passing:
         query = np.asarray(times, dtype=np.float64)
         grid = self.guide.t
         step = grid[1] - grid[0] if len(grid) > 1 else 1.0
-        index = np.clip(np.rint((query - grid[0]) / step), 0, len(grid) - 1).astype(np.intp)
-        return self.side[:, index]
+        index = np.rint((query - grid[0]) / step).astype(np.intp)
+        return self.side.take(index, axis=1, mode="clip")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,9 @@ from repair.types import Array, Curve, Limits, RepairProblem, Side, SolveResult,
 
 __all__ = ["EgoBackend", "Pairs", "anchor_pairs"]
 
+# NumPy compares with plain integers several times faster than with an enumeration's members.
+_AHEAD, _LEFT = int(Side.AHEAD), int(Side.LEFT)
+
 
 class Pairs(NamedTuple):
     """The paper's {p, v} pairs, one row each: d = (Q_i - p) . v with v along an axis.
@@ -72,12 +75,12 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
         side = passing.side_at(times[first:])
         free = shape[first:]
         inside = (lower < free) & (free < upper)
-        along = side <= Side.AHEAD
+        along = side <= _AHEAD
         obstacle, row = np.where(along, inside[..., 1], inside[..., 0]).nonzero()
         chosen = side[obstacle, row]
-        axis = (chosen > Side.AHEAD).astype(np.intp)
+        axis = (chosen > _AHEAD).astype(np.intp)
         # Ahead and left lie at the upper corner of the box, behind and right at the lower one.
-        positive = (chosen == Side.AHEAD) | (chosen == Side.LEFT)
+        positive = (chosen == _AHEAD) | (chosen == _LEFT)
         anchor = np.where(positive, upper[obstacle, row, axis], lower[obstacle, row, axis])
         sign = np.where(positive, 1.0, -1.0)
         parts.append((row + first, axis, sign, anchor, np.full(len(row), problem.clearance)))
@@ -120,6 +123,7 @@ def _with_pairs(bounds: SoftBounds, pairs: Pairs, collision: float) -> SoftBound
         np.concatenate((bounds.limit, -pairs.sign * pairs.anchor - pairs.threshold)),
         np.concatenate((bounds.joint, pairs.threshold)),
         np.concatenate((bounds.weight, np.full(len(pairs.row), collision))),
+        np.concatenate((bounds.bend, (6.0 * collision) * pairs.threshold)),
     )
 
 
@@ -236,7 +240,8 @@ class EgoBackend:
             clear = _closest(pairs, led) >= 0.0
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
             if clear and (
-                cap is None or (np.diff(led[:, 0]) / self.spacing <= 1.02 * _bend_speed(problem, led)).all()
+                cap is None
+                or (led[1:, 0] - led[:-1, 0] <= 1.02 * self.spacing * _bend_speed(problem, led)).all()
             ):
                 break
             if not clear:
@@ -288,7 +293,7 @@ class EgoBackend:
         limit = bounds.limit.copy()
         speeds = limit[: (n - 1) * len(axes) : len(axes)]
         np.minimum(speeds, cap, out=speeds)
-        return bounds._replace(limit=limit)
+        return SoftBounds(limit, bounds.joint, bounds.weight, bounds.bend)
 
     @property
     def _penalties(self) -> tuple[float, ...]:
@@ -314,7 +319,11 @@ class EgoBackend:
         else:
             minimum = lbfgs(cost, c.max_iterations, c.tolerance, deadline, precondition=c.precondition)
         axes = minimum.points.shape[1]
-        return minimum._replace(points=np.concatenate((minimum.points, start[:, axes:]), axis=1))
+        if axes == start.shape[1]:
+            return minimum
+        points = start.copy()
+        points[:, :axes] = minimum.points
+        return Minimum(points, minimum.cost, minimum.iterations, minimum.converged)
 
     # -- refinement ------------------------------------------------------------------------------
 

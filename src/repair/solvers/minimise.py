@@ -65,13 +65,15 @@ def newton(cost: SplineCost, limit: int, tolerance: float, deadline: float | Non
         step = dpbtrs(factor, here.gradient, lower=1)[0]
         descent = float(step.dot(here.gradient))
         share = 1.0
-        there = cost(u - step)
+        moved = u - step
+        there = cost(moved)
         while there.value > here.value - _SUFFICIENT * share * descent:
             share *= 0.5
             if share < _SHORTEST:  # rounding leaves no better point than this one
                 return Minimum(cost.points(u), here.value, iteration, descent <= tolerance * tolerance)
-            there = cost(u - share * step)
-        u, here = u - share * step, there
+            moved = u - share * step
+            there = cost(moved)
+        u, here = moved, there
         if float(dpbtrs(factor, here.gradient, lower=1)[0].dot(here.gradient)) <= tolerance * tolerance:
             return Minimum(cost.points(u), here.value, iteration, True)
     return Minimum(cost.points(u), here.value, limit, False)

@@ -44,16 +44,39 @@ class SoftBounds(NamedTuple):
     joint : (K,) array
         D.
     weight : (K,) array
+    bend : (K,) array
+        6 weight D, the curvature from the joint on.
     """
 
     limit: Array
     joint: Array
     weight: Array
+    bend: Array
 
-    def evaluate(self, x: Array) -> tuple[float, Array, Array]:
-        """Sum of the weighted penalties of quantities (K,), and the slope and curvature of each."""
-        value, slope, curvature = cubic_quadratic(x - self.limit, self.joint)
-        return float(self.weight.dot(value)), self.weight * slope, self.weight * curvature
+    @classmethod
+    def of(cls, limit: Array, joint: Array, weight: Array) -> SoftBounds:
+        """Bounds with their curvature worked out."""
+        return cls(limit, joint, weight, 6.0 * weight * joint)
+
+    def evaluate(self, x: Array, limit: Array | None = None) -> tuple[float, Array, Array]:
+        """Sum of the weighted penalties of quantities (K,), and the slope and curvature of each.
+
+        As :func:`cubic_quadratic`, in fewer operations: a search evaluates this some fifty times.
+        ``limit`` stands in for the own one.
+        """
+        rest = x - (self.limit if limit is None else limit)
+        np.maximum(rest, 0.0, out=rest)
+        cubic = np.minimum(rest, self.joint)
+        rest -= cubic
+        curvature = self.weight * cubic
+        slope = curvature * cubic
+        value = float(slope.dot(cubic))
+        slope *= 3.0
+        beyond = self.bend * rest
+        slope += beyond
+        rest += self.joint
+        curvature *= 6.0
+        return value + 0.5 * float(beyond.dot(rest)), slope, curvature
 
 
 def feasibility_bounds(
@@ -94,5 +117,5 @@ def feasibility_bounds(
     limit[1, : n - 1, 0] = 0.0
     joint[1, : n - 1, 0] = REVERSE_JOINT
     weight[1, : n - 1, 0] = reverse_weight
-    above, below = (SoftBounds(limit[k], joint[k], weight[k]) for k in (0, 1))
+    above, below = (SoftBounds.of(limit[k], joint[k], weight[k]) for k in (0, 1))
     return above, below

@@ -2,8 +2,7 @@
 
 J = lambda_s J_s + the penalties of the derivatives' control points and of the {p, v} pairs
 + lambda_f J_f (paper, Sec. IV-C and IV-D). It is convex and twice continuously differentiable, and
-every term couples neighbouring control points only: the Hessian is a band, and value, gradient and
-Newton step cost O(n).
+every term couples neighbouring control points only, so that the Hessian is a band.
 """
 
 from __future__ import annotations
@@ -11,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations_with_replacement
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg.blas import dsbmv
 
-from repair.bspline import basis_matrix
+from repair.bspline import basis_matrix, derivative_matrix
 from repair.solvers.penalties import SoftBounds
 from repair.types import Array, frozen
 
@@ -30,41 +28,44 @@ _NONE, _NOTHING = np.empty(0, dtype=np.intp), np.empty(0)
 
 @dataclass(frozen=True)
 class _Structure:
-    """What depends on numbers of points and axes, spacing and the free points alone.
+    """What depends on numbers of points and axes, spacing, the free points and lambda_s alone.
 
     Free coordinates are numbered point by point, ``(i - first) * axes + axis``. The band is the lower
     form of LAPACK, column by column: entry (r, c) with r >= c at ``c * (width + 1) + r - c``.
     """
 
-    scale: Array  # (3n - 6, 1): 1 / spacing**k of every row
-    smooth: Array  # ((3n - 6) axes,): what J_s makes of every row's square, 2 / spacing**0 on A and J
+    stack: Array  # (3n - 6, n): control points of one axis to [V; A; J]
+    free: Array  # (3n - 6, m): the columns of the free ones
+    smooth: Array  # ((3n - 6) axes,): curvature of lambda_s J_s by every row
     width: int  # of the band
-    band: Array  # ((m axes) * (width + 1),): Hessian of J_s
+    band: Array  # ((m axes) * (width + 1),): Hessian of lambda_s J_s
     factor: Array  # ((3n - 6) axes, 10): by which a row's curvature is added to the band,
     where: npt.NDArray[np.intp]  # ((3n - 6) axes * 10,): and to which of its entries
 
 
-@lru_cache(maxsize=128)
-def _structure(n: int, axes: int, first: int, last: int, spacing: float, width: int) -> _Structure:
+@lru_cache(maxsize=64)
+def _structure(
+    n: int, axes: int, first: int, last: int, spacing: float, weight: float, width: int
+) -> _Structure:
+    stack = np.vstack([derivative_matrix(n, k, spacing) for k in _ORDERS])
     size = (last - first) * axes
-    rows = sum(n - k for k in _ORDERS)
-    where, factor = np.zeros((rows, axes, 10), dtype=np.intp), np.zeros((rows, axes, 10))
+    where, factor = np.zeros((len(stack), axes, 10), dtype=np.intp), np.zeros((len(stack), axes, 10))
     row = 0
     for k in _ORDERS:
-        stencil = [(-1.0) ** (k - q) * comb(k, q) / spacing**k for q in range(k + 1)]
         pairs = list(combinations_with_replacement(range(k + 1), 2))
         for i in range(n - k):
             for slot, (low, high) in enumerate(pairs):
                 if first <= i + low and i + high < last:
                     column = (i + low - first) * axes + np.arange(axes)
                     where[row, :, slot] = column * (width + 1) + (high - low) * axes
-                    factor[row, :, slot] = stencil[low] * stencil[high]
+                    factor[row, :, slot] = stack[row, i + low] * stack[row, i + high]
             row += 1
-    scale = np.concatenate([np.full((n - k, 1), spacing**-k) for k in _ORDERS])
-    smooth = np.repeat([0.0, 2.0, 2.0], [(n - k) * axes for k in _ORDERS])
+    smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     factors = frozen(factor.reshape(-1, 10))
     band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
-    return _Structure(frozen(scale), frozen(smooth), width, frozen(band), factors, where.ravel())
+    return _Structure(
+        frozen(stack), frozen(stack[:, first:last]), frozen(smooth), width, frozen(band), factors, where.ravel()
+    )  # fmt: skip
 
 
 class Point(NamedTuple):
@@ -115,76 +116,51 @@ class SplineCost:
         n, axes = points.shape
         width = 3 * axes if fit is None else max(3 * axes, len(fit) - 1)
         self.axes, self.size, self.free = axes, (last - first) * axes, slice(first, last)
-        made = self._structure = _structure(n, axes, first, last, spacing, width)
-        self._points, self._paired, self._sign = points, paired, sign
+        made = self._structure = _structure(n, axes, first, last, spacing, smooth, width)
+        self._points, self._sign = points, sign
         self._bounds, self._fit, self._constant = bounds, fit, constant
         self._coordinate = paired - first * axes  # of every pair, in u
         self._rows = rows = len(made.smooth)
-        self._weights = smooth * made.smooth
-        self._band = smooth * made.band
+        self._band = made.band
         if fit is not None:
+            self._band = made.band.copy()
             self._band.reshape(self.size, width + 1)[:, : len(fit)] += fit.T
-        # Buffers, made once for all evaluations, and the views that these need.
-        self._moved, self._pull = np.zeros((2, n, axes))
-        self._free, self._free_pull = self._moved[first:last], self._pull[first:last]
+        x = (made.stack @ points).ravel()
+        self._derivatives = x
+        self._limit = bounds.limit.copy()  # of what is added to the quantities at u = 0
+        self._limit[:rows] -= x
+        self._limit[rows : 2 * rows] += x
+        self._limit[2 * rows :] -= points.ravel()[paired] * sign
         self._quantities = np.empty(2 * rows + len(paired))
-        self._stack, self._slope = self._quantities[:rows].reshape(-1, axes), np.empty((rows // axes, axes))
-        cuts = ((0, n - 1), (n - 1, 2 * n - 3), (2 * n - 3, 3 * n - 6))
-        self._parts = [self._stack[a:b] for a, b in cuts]
-        self._slopes = [self._slope[a:b] for a, b in cuts]
-        origin = self._measure(points).copy()
-        self._derivatives = origin[:rows]
-        self._reduced = bounds._replace(limit=bounds.limit - origin)
 
     def points(self, u: Array) -> Array:
         """Control points (n, axes) at the displacements u."""
-        self._free[:] = u.reshape(self._free.shape)
-        return self._points + self._moved
-
-    def _measure(self, points: Array) -> Array:
-        """What is bounded, of control points (n, axes): x, -x and the paired coordinates (a buffer)."""
-        v, a, j = self._parts
-        np.subtract(points[1:], points[:-1], out=v)
-        np.subtract(v[1:], v[:-1], out=a)
-        np.subtract(a[1:], a[:-1], out=j)
-        self._stack *= self._structure.scale
-        found, rows = self._quantities, self._rows
-        np.negative(found[:rows], out=found[rows : 2 * rows])
-        np.multiply(points.ravel()[self._paired], self._sign, out=found[2 * rows :])
-        return found
+        points = self._points.copy()
+        points[self.free] += u.reshape(-1, self.axes)
+        return points
 
     def __call__(self, u: Array) -> Point:
         """Value, gradient and curvatures at u."""
-        rows = self._rows
-        self._free[:] = u.reshape(self._free.shape)
-        moved = self._measure(self._moved)
-        penalty, slope, curvature = self._reduced.evaluate(moved)
-        x = self._derivatives + moved[:rows]
-        bent = self._weights * x
-        value = self._constant + 0.5 * float(bent.dot(x)) + penalty
+        rows, moved = self._rows, self._quantities
+        free = self._structure.free
+        change = (free @ u.reshape(-1, self.axes)).ravel()
+        moved[:rows] = change
+        np.negative(change, out=moved[rows : 2 * rows])
+        np.multiply(u[self._coordinate], self._sign, out=moved[2 * rows :])
+        penalty, slope, curvature = self._bounds.evaluate(moved, self._limit)
+        change += self._derivatives
+        bent = self._structure.smooth * change
+        value = self._constant + 0.5 * float(bent.dot(change)) + penalty
         bent += slope[:rows]
         bent -= slope[rows : 2 * rows]
-        gradient = self._pulled_back(bent)
-        if len(self._paired):
+        gradient = (free.T @ bent.reshape(-1, self.axes)).ravel()
+        if len(self._coordinate):
             gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
         if self._fit is not None:
             pull = dsbmv(len(self._fit) - 1, 1.0, self._fit, u, lower=1)
             value += 0.5 * float(pull.dot(u))
             gradient += pull
         return Point(value, gradient, curvature)
-
-    def _pulled_back(self, slopes: Array) -> Array:
-        """The transpose of the differences in :meth:`_measure`, applied to the slopes of x."""
-        np.multiply(slopes.reshape(self._slope.shape), self._structure.scale, out=self._slope)
-        v, a, j = self._slopes
-        a[:-1] -= j
-        a[1:] += j
-        v[:-1] -= a
-        v[1:] += a
-        self._pull[0] = 0.0
-        self._pull[1:] = v
-        self._pull[:-1] -= v
-        return self._free_pull.flatten()
 
     def quadratic(self) -> Array:
         """Band of the Hessian where no penalty is active; see :meth:`hessian`."""
@@ -198,7 +174,7 @@ class SplineCost:
         if curvature.any():
             added = made.factor * curvature[:, None]
             band = band + np.bincount(made.where, added.ravel(), len(band))
-        if len(self._paired):
+        if len(self._coordinate):
             entry = self._coordinate * (made.width + 1)
             band = band + np.bincount(entry, point.curvature[2 * rows :], len(band))
         return band.reshape(self.size, -1).T
