@@ -8,6 +8,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,10 @@ __all__ = ["CollisionWorld", "Contact", "RoadBoundary", "official_shifts"]
 
 # Shapes closer than this [m] count as touching: rounding must not make us laxer than pycrcc.
 _TOUCH = 1e-6
+# Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
+_SPARE = 1e-3
+# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
+_BOX = 2.0
 
 
 class Contact(NamedTuple):
@@ -138,6 +143,22 @@ class CollisionWorld:
         radius = np.hypot(self._track[:, :, 3], self._track[:, :, 4])
         radius = np.where(self._kind == _RECTANGLE, radius, self._track[:, :, 3])
         self._reach = (radius + ego_radius + _TOUCH) ** 2
+        self._build_blocks(radius + ego_radius)
+
+    def _build_blocks(self, radius: Array) -> None:
+        """A circle around each track over each block of samples, what the ego needs included."""
+        size = self._block = 2 * self.substeps
+        count = -(-self.n_samples // size)
+        shape = (count, size, len(self._kind))
+        x, y, r = (np.full(shape, np.nan) for _ in range(3))
+        for table, values in ((x, self._x), (y, self._y), (r, radius)):
+            table.reshape(count * size, -1)[: self.n_samples] = values
+        # fmin and fmax pass over the samples at which an obstacle is not there
+        self._block_x = 0.5 * (np.fmin.reduce(x, axis=1) + np.fmax.reduce(x, axis=1))
+        self._block_y = 0.5 * (np.fmin.reduce(y, axis=1) + np.fmax.reduce(y, axis=1))
+        away = np.hypot(x - self._block_x[:, None], y - self._block_y[:, None])
+        self._block_reach = np.fmax.reduce(away + r, axis=1) + _SPARE
+        self._block_middle = np.arange(count) * size + size // 2
 
     def _interpolate(self, rows: Array) -> Array:
         """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
@@ -210,18 +231,57 @@ class CollisionWorld:
         rows = slice(start, start + len(x))
         if start < 0 or rows.stop > self.n_samples:
             raise ValueError(f"samples {start} to {rows.stop} of a world of {self.n_samples}")
-        if not (np.isfinite(x).all() and np.isfinite(y).all() and np.isfinite(orientation).all()):
+        if not np.isfinite(np.array((x, y, orientation))).all():
             raise ValueError("the ego's poses are not finite")
-        dx = self._x[rows] - x[:, None]
-        dy = self._y[rows] - y[:, None]
-        k, m = np.nonzero(dx * dx + dy * dy <= self._reach[rows])
+        near = self._near(x, y, start)
+        if near is None:
+            return None
+        rows, tracks = near
+        ego = slice(rows.start - start, rows.stop - start)
+        x, y, orientation = x[ego], y[ego], orientation[ego]
+        dx = self._x[rows, tracks] - x[:, None]
+        dy = self._y[rows, tracks] - y[:, None]
+        k, m = np.nonzero(dx * dx + dy * dy <= self._reach[rows, tracks])
         if not len(k):
             return None
-        poses = self._track[rows][k, m]
+        found = self._first_touch(rows.start, (x, y, orientation), (dx[k, m], dy[k, m]), k, tracks[m])
+        return None if found is None else (found[0] + ego.start, found[1])
+
+    def _near(self, x: Array, y: Array, start: int) -> tuple[slice, npt.NDArray[np.intp]] | None:
+        """The samples and tracks outside of which nothing touches, from one look at every block."""
+        size, stop = self._block, start + len(x)
+        blocks = slice(start // size, -(-stop // size))
+        # Within a block no sample is farther than half a block from the one that is looked at.
+        at = np.minimum(np.maximum(self._block_middle[blocks] - start, 0), len(x) - 1)
+        dx, dy = x[1:] - x[:-1], y[1:] - y[:-1]
+        farthest = np.maximum.reduce(dx * dx + dy * dy, initial=0.0)
+        reach = self._block_reach[blocks] + size // 2 * float(farthest) ** 0.5
+        dx = self._block_x[blocks] - x[at, None]
+        dy = self._block_y[blocks] - y[at, None]
+        near = dx * dx + dy * dy <= reach * reach
+        when = np.flatnonzero(np.logical_or.reduce(near, axis=1))
+        if not len(when):
+            return None
+        first = max((blocks.start + int(when[0])) * size, start)
+        last = min((blocks.start + int(when[-1]) + 1) * size, stop)
+        return slice(first, last), np.flatnonzero(np.logical_or.reduce(near, axis=0))
+
+    def _first_touch(
+        self,
+        start: int,
+        ego: tuple[Array, Array, Array],
+        offset: tuple[Array, Array],
+        k: npt.NDArray[np.intp],
+        m: npt.NDArray[np.intp],
+    ) -> tuple[int, int] | None:
+        """The first of the pairs of sample ``k`` (from ``start``) and track ``m`` that meet."""
+        x, y, orientation = ego
+        dx, dy = offset
+        poses = self._track[start + k, m]
         kind = self._kind[m]
         cos, sin = np.cos(orientation[k]), np.sin(orientation[k])
-        forward = cos * dx[k, m] + sin * dy[k, m]
-        left = cos * dy[k, m] - sin * dx[k, m]
+        forward = cos * dx + sin * dy
+        left = cos * dy - sin * dx
         hit = _rectangles_touch(
             forward, left, poses[:, 2] - orientation[k], self._half, poses[:, 3], poses[:, 4]
         )
@@ -335,6 +395,8 @@ class RoadBoundary:
         outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
         self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
         shapely.prepare(self.region)
+        # More than the rounding of any coordinate of the region.
+        self._spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
 
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
@@ -345,10 +407,51 @@ class RoadBoundary:
         x, y, orientation : (K,) array
             Centre [m] and orientation [rad] of the ego.
         """
+        unsure = np.flatnonzero(~self._surely_inside(x, y, orientation))
+        if not len(unsure):
+            return None
+        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
+        return None if inside.all() else int(unsure[np.argmin(inside)])
+
+    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
+        """Whether polygons (K, V, 2) lie properly inside of the region."""
         import shapely
 
-        inside = shapely.contains_properly(self.region, shapely.polygons(self._outline(x, y, orientation)))
-        return None if inside.all() else int(np.argmin(inside))
+        return np.asarray(shapely.contains_properly(self.region, shapely.polygons(outlines)))
+
+    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
+        """Poses (K,) that lie inside because a larger box does; False says nothing.
+
+        One box, turned like the pose in its middle, holds several consecutive poses: asking about
+        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
+        a pose turned by an angle t reaches farther, at most size * |t|.
+        """
+        count = len(x)
+        known = np.zeros(count, dtype=np.bool_)
+        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
+        if not np.isfinite(np.array((x, y, orientation))).all():
+            return known
+        size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
+        if size < 2:
+            return known
+        pose = _grouping(count, size)
+        middle = pose[:, size // 2]
+        centre = x + 1j * y
+        axis = np.empty(len(pose), dtype=np.complex128)
+        axis.real, axis.imag = np.cos(orientation[middle]), np.sin(orientation[middle])
+        seen = (centre[pose] - centre[middle, None]) * axis.conj()[:, None]
+        turn = np.maximum.reduce(np.abs(orientation[pose] - orientation[middle, None]), axis=1)
+        half = self._corners[0] + turn[:, None] * self._corners[0, ::-1] + self._spare
+        parts = seen.view(np.float64).reshape(*pose.shape, 2)
+        sides = np.concatenate(
+            (np.minimum.reduce(parts, axis=1) - half, np.maximum.reduce(parts, axis=1) + half), axis=1
+        )
+        corners = (
+            sides.take(_AROUND, axis=1).view(np.complex128)[..., 0] * axis[:, None] + centre[middle, None]
+        )
+        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
+        known[pose[inside]] = True
+        return known
 
     def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
         """Whether the ego is off the road already at this pose."""
@@ -393,6 +496,19 @@ class RoadBoundary:
                 corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
                 self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
         return self._triangles is not False
+
+
+# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
+_MOST = 32
+_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
+
+
+@lru_cache(maxsize=256)
+def _grouping(count: int, size: int) -> npt.NDArray[np.intp]:
+    """Indices (G, size) of consecutive poses in groups; the last pose fills up the last group."""
+    groups = np.minimum(np.arange(-(-count // size) * size), count - 1).reshape(-1, size)
+    groups.setflags(write=False)
+    return groups
 
 
 def _section_outlines(network: Any) -> list[Array]:

@@ -28,7 +28,7 @@ class Peaks:
     max_total_acceleration: float
 
 
-def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Peaks:
+def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | slice | None = None) -> Peaks:
     """Peaks over the samples that ``keep`` selects (all by default).
 
     The longitudinal acceleration is the derivative of the signed speed, the lateral one speed times
@@ -45,12 +45,12 @@ def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Pea
     if keep is not None:
         longitudinal, lateral, speed = longitudinal[keep], lateral[keep], speed[keep]
     return Peaks(
-        float(speed.min()),
-        float(speed.max()),
-        float(longitudinal.min()),
-        float(longitudinal.max()),
-        float(np.abs(lateral).max()),
-        float(np.hypot(longitudinal, lateral).max()),
+        float(np.minimum.reduce(speed)),
+        float(np.maximum.reduce(speed)),
+        float(np.minimum.reduce(longitudinal)),
+        float(np.maximum.reduce(longitudinal)),
+        float(np.maximum.reduce(np.abs(lateral))),
+        float(np.maximum.reduce(np.hypot(longitudinal, lateral))),
     )
 
 
