@@ -253,7 +253,7 @@ class Checker:
         inner = dense.t[skip::n]
         if len(t) != len(inner) or max(abs(t[0] - inner[0]), abs(t[-1] - inner[-1])) > 1e-9:
             return True
-        position = dense.position[skip::n]
+        position = np.ascontiguousarray(dense.position[skip::n])
         inside = (occupancy.lower[:, rows] < position) & (position < occupancy.upper[:, rows])
         return bool((inside[..., 0] & inside[..., 1]).any())
 

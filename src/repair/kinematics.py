@@ -222,8 +222,8 @@ def _slip_angle(
     """
     if slip0 is None:
         first = int(np.argmax(moving)) if moving.any() else -1
-        bend = rear * turn[first] / step[first] if first >= 0 else 0.0
-        slip0 = float(np.arcsin(np.clip(bend, -0.95, 0.95)))
+        bend = float(rear * turn[first] / step[first]) if first >= 0 else 0.0
+        slip0 = float(np.arcsin(min(max(bend, -0.95), 0.95)))
     if not len(step):
         return np.array([slip0])
     ratio = step * (0.5 / rear)
@@ -321,8 +321,7 @@ def clearly_drivable(states: DrivenStates, dt: float, vehicle: Vehicle) -> bool:
         and rise <= _SURE * engine * dt
         and -fall <= _SURE * acceleration * vehicle.a_max * dt
         and float(np.maximum.reduce(total)) <= (_SURE * friction * vehicle.a_max) ** 2
-        and min(np.minimum.reduce(states.x), np.minimum.reduce(states.y)) >= -_FAR
-        and max(np.maximum.reduce(states.x), np.maximum.reduce(states.y)) <= _FAR
+        and float(np.maximum.reduce(np.abs((states.x, states.y)), axis=None)) <= _FAR
     )
     if not within:
         return False
@@ -338,31 +337,36 @@ def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, A
     psi, delta = states.orientation, states.steering
     most = dt * _STEERING_RATE * vehicle.steering_rate_max
     change = np.minimum(np.maximum(delta[1:] - delta[:-1], -most), most)
-    start = delta[:-1]
-    turned, moved = _integrate(start, start + change, states.speed, psi[:-1], dt, vehicle.wheelbase)
+    turned, moved = _integrate(delta[:-1], change, states.speed, psi[:-1], dt, vehicle.wheelbase)
     axle = np.array((states.x, states.y)) - vehicle.rear * np.array((np.cos(psi), np.sin(psi)))
     shift = np.abs(axle[:, 1:] - axle[:, :-1] - moved)
     return np.maximum(shift[0], shift[1]), np.abs(psi[1:] - psi[:-1] - turned)
 
 
+# Runge-Kutta of order 4 over a step on which steering angle and speed are linear in time: weights of
+# the start, the middle and the end in the turn until each of the three, and in the way.
+_TURN = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24.0
+_WAY = np.array([[1.0], [2.0], [1.0]]) / 6.0  # of the sum of both speeds in the middle
+_MEAN = np.array([[1.0], [0.5], [1.0]])
+
+
 def _integrate(
-    delta: Array, delta_end: Array, v: Array, psi: Array, dt: float, wheelbase: float
+    delta: Array, change: Array, v: Array, psi: Array, dt: float, wheelbase: float
 ) -> tuple[Array, Array]:
     """Change of orientation (T - 1,) and rear-axle position (2, T - 1) at constant inputs.
 
-    Steering angle and speed are linear in time, so that Runge-Kutta of order 4 becomes Simpson's rule,
-    first for the orientation (and its value in the middle), then for the position. ``v`` is (T,), the
-    other arrays are (T - 1,).
+    Steering angle (``delta`` and its ``change``) and speed are linear in time, so that Runge-Kutta
+    becomes Simpson's rule, first for the orientation (and its value in the middle), then for the
+    position. ``v`` is (T,), the other arrays are (T - 1,).
     """
     v_start, v_end = v[:-1], v[1:]
-    v_twice = v_start + v_end
-    tangent = np.tan(np.array((delta, 0.5 * (delta + delta_end), delta_end)))
-    start, mid, end = tangent * np.array((v_start, 0.5 * v_twice, v_end)) * (dt / wheelbase)
-    turned = (start + 4.0 * mid + end) / 6.0
-    angle = np.array((psi, psi + (5.0 * start + 8.0 * mid - end) / 24.0, psi + turned))
-    weighted = np.array((v_start, 2.0 * v_twice, v_end)) * (dt / 6.0)
-    parts = np.array((np.cos(angle), np.sin(angle))) * weighted
-    return turned, parts[:, 0] + parts[:, 1] + parts[:, 2]
+    speeds = np.array((v_start, v_start + v_end, v_end))
+    tangent = np.tan(np.array((delta, delta + 0.5 * change, delta + change)))
+    turned = _TURN @ (tangent * speeds * (_MEAN * (dt / wheelbase)))
+    angle = turned + psi
+    way = speeds * (_WAY * dt)
+    moved = np.add.reduce(np.array((np.cos(angle) * way, np.sin(angle) * way)), axis=1)
+    return turned[2], moved
 
 
 def official_check(

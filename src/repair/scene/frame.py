@@ -276,37 +276,33 @@ class FrenetFrame:
 
         Every repair that is tried comes through here: calls into NumPy are what it costs.
         """
-        s, lateral = np.ascontiguousarray(position.T)
-        s_rate, sideways = np.ascontiguousarray(velocity.T)
+        s, s_rate, sideways = position[:, 0], velocity[:, 0], velocity[:, 1]
         index, u = self._locate(s)
         c3, c2, c1, c0 = self._coefficients.take(index, axis=2)
         c3u = c3 * u
         axis = ((c3u + c2) * u + c1) * u + c0
-        slope = 3.0 * c3u + c2  # half of the second derivative
-        x1, y1 = tangent = (slope + c2) * u + c1
-        x2, y2 = slope
+        second = 3.0 * c3u + c2  # half of it
+        tangent = (second + c2) * u + c1
+        x1, y1 = tangent[0], tangent[1]
         square = x1 * x1 + y1 * y1
-        norm = np.sqrt(square)
-        offset = lateral / norm
+        offset = position[:, 1] / np.sqrt(square)
         plane = np.empty_like(axis)
-        plane[0] = axis[0] - offset * y1
-        plane[1] = axis[1] + offset * x1
-        bend = 2.0 * (x1 * y2 - y1 * x2) / square  # curvature times norm
-        forward = s_rate * (1.0 - bend * offset)
-        speed = np.sqrt(forward * forward + sideways * sideways)
-        angle = np.arctan2(tangent[1], tangent[0])
+        np.subtract(axis[0], offset * y1, out=plane[0])
+        np.add(axis[1], offset * x1, out=plane[1])
+        bend = (x1 * second[1] - y1 * second[0]) / square  # half of the curvature times the tangent's length
+        forward = s_rate * (1.0 - 2.0 * bend * offset)
+        speed = np.hypot(forward, sideways)
+        base = self._continuous(np.arctan2(y1, x1), index)
         if s_rate.size and np.minimum.reduce(s_rate) >= 0.0:
             slip = np.arctan2(sideways, forward)
         else:
             sign = np.where(s_rate < 0.0, -1.0, 1.0)
             slip = np.arctan2(sign * sideways, sign * forward)
             speed *= sign
-        base = self._continuous(angle, index)
-        heading = _held(base + slip, base, np.abs(speed) >= STANDSTILL)
+        heading = _held(base + slip, base, np.abs(speed))
         step = plane[:, 1:] - plane[:, :-1]
-        step *= step
         distance = np.zeros(len(s))
-        np.cumsum(np.sqrt(step[0] + step[1]), out=distance[1:])
+        np.add.accumulate(np.hypot(step[0], step[1]), out=distance[1:])
         return CartesianPath(t, plane.T, heading, speed, distance)
 
 
@@ -318,10 +314,11 @@ def _pairs(x: Array, y: Array) -> Array:
     return made
 
 
-def _held(heading: Array, fallback: Array, moving: npt.NDArray[np.bool_]) -> Array:
+def _held(heading: Array, fallback: Array, pace: Array) -> Array:
     """Headings with those of standing samples taken from the last (else the first) moving one."""
-    if moving.all():
+    if np.minimum.reduce(pace, initial=np.inf) >= STANDSTILL:
         return _unwrapped(heading)
+    moving = pace >= STANDSTILL
     if not moving.any():
         return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
