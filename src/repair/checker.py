@@ -6,6 +6,7 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -117,7 +118,7 @@ class Checker:
 
     def times(self, t_end: float) -> Array:
         """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
-        steps = min(int(np.floor(t_end / self.scene.dt + 1e-6)), self.scene.n_steps)
+        steps = min(math.floor(t_end / self.scene.dt + 1e-6), self.scene.n_steps)
         return self._times[: max(steps * self.config.substeps + 1, 0)]
 
     def _path(self, curve: Curve, t_end: float) -> CartesianPath:
@@ -153,7 +154,7 @@ class Checker:
 
         Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
         """
-        first = max(int(np.floor(problem.t_rep / self.scene.dt + 1e-6)) - 1, 0) * self.config.substeps
+        first = max(math.floor(problem.t_rep / self.scene.dt + 1e-6) - 1, 0) * self.config.substeps
         times = self.times(problem.t_end)
         after = curve.sample(times[times.searchsorted(problem.t_rep - 1e-9) :])
         path, slip0 = self._spliced(problem, after, times, first)
@@ -292,4 +293,6 @@ _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not 
 
 
 def _finite(path: CartesianPath) -> bool:
+    if len(path.t) > 1 and math.isfinite(path.distance[-1] + np.add.reduce(path.heading)):
+        return True  # a point that is not finite would make the distance so
     return bool(np.isfinite(path.xy).all() and np.isfinite(path.heading).all())

@@ -30,7 +30,7 @@ _TOUCH = 1e-6
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
 # Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
-_BOX = 2.0
+_BOX = 4.0
 
 
 class Contact(NamedTuple):
@@ -331,9 +331,11 @@ def _rectangles_touch(
     along = _parts(turn)
     across = along[::-1]
     from_ego = size[0] * along + size[1] * across + np.array([[half[0] + _TOUCH], [half[1] + _TOUCH]])
-    from_other = half[0] * along + half[1] * across + size + _TOUCH
-    hit = (_parts(offset) <= from_ego) & (_parts(offset * turn.conj()) <= from_other)
-    return np.asarray(hit[0] & hit[1])
+    hit = np.logical_and.reduce(_parts(offset) <= from_ego, axis=0)
+    if hit.any():  # mostly one of the ego's own axes tells the two apart
+        from_other = half[0] * along + half[1] * across + size + _TOUCH
+        hit &= np.logical_and.reduce(_parts(offset * turn.conj()) <= from_other, axis=0)
+    return np.asarray(hit)
 
 
 def _polygon_touches(

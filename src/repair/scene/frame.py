@@ -141,7 +141,7 @@ class FrenetFrame:
         # fmax/fmin send NaN to segment 0; the offset stays NaN and so does the result
         where = np.floor(query * self._inverse) + 1.0
         index = np.fmin(np.fmax(where, 0.0), self._last).astype(np.intp)
-        return index, query - self._knots[index]
+        return index, query - self._knots.take(index)
 
     def _derivatives(self, s: npt.ArrayLike, highest: int) -> tuple[list[Array], Any]:
         """Position and derivatives by s up to ``highest``, each (2, ...), and the segment."""
@@ -168,7 +168,7 @@ class FrenetFrame:
         return self._continuous(np.arctan2(y1, x1), index)
 
     def _continuous(self, angle: Array, index: Any) -> Array:
-        turns = np.rint((self._turns[index] - angle) / (2.0 * np.pi))
+        turns = np.rint((self._turns.take(index) - angle) / (2.0 * np.pi))
         return np.asarray(angle + 2.0 * np.pi * turns)
 
     def curvature(self, s: npt.ArrayLike) -> Array:
