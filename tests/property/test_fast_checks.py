@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import repair.collision
-from repair.collision import CollisionWorld, RoadBoundary
+from repair.collision import CollisionWorld, RoadBoundary, _grouping
 from repair.kinematics import DrivenStates, clearly_drivable, direct_check, drive
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
@@ -66,6 +65,10 @@ def test_most_poses_on_a_wide_road_are_settled_by_boxes():
     road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
     x = np.linspace(0.0, 60.0, 161)
     assert road._surely_inside(x, np.sin(x / 9.0), 0.1 * np.cos(x / 9.0)).all()
+
+
+def test_the_last_pose_fills_up_the_last_group():
+    assert _grouping(10, 4).T.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 9, 9]]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
@@ -156,7 +159,3 @@ def test_what_is_not_a_number_is_not_clearly_drivable(name):
     for k in range(9):
         broken = columns | {name: np.where(np.arange(9) == k, np.nan, columns[name])}
         assert not clearly_drivable(DrivenStates(t, **broken), 0.1, EGO)
-
-
-def test_boxes_hold_few_poses_only_where_the_ego_is_fast():
-    assert repair.collision._grouping(10, 4).T.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 9, 9]]
