@@ -94,9 +94,29 @@ def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order:
 
 
 @lru_cache(maxsize=256)
-def _sampling(times: bytes, n: int, degree: int, spacing: float) -> Array:
-    tau = np.frombuffer(times)
+def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
+    tau = np.frombuffer(offsets)
     return frozen(np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)]))
+
+
+@lru_cache(maxsize=256)
+def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
+    """Matrix (4 K, n) from control points to position and three derivatives at ``times``.
+
+    Beyond the span the end speed is held, which is linear in the control points as well.
+    """
+    since = np.frombuffer(times) - t_start
+    tau = np.clip(since, 0.0, t_start + (n - degree) * spacing - t_start)
+    # The same offsets come back for other start times, up to rounding.
+    matrix = _sampling(np.round(tau, 12).tobytes(), n, degree, spacing)
+    beyond = since - tau
+    out = np.flatnonzero(np.abs(beyond) > 1e-9)
+    if not len(out):
+        return matrix
+    held = matrix.reshape(4, len(tau), n).copy()
+    held[0, out] += beyond[out, None] * held[1, out]
+    held[2:, out] = 0.0
+    return frozen(held.reshape(matrix.shape))
 
 
 @dataclass(frozen=True)
@@ -145,18 +165,11 @@ class UniformBSpline:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        tau = np.clip(times - self.t_start, 0.0, self.t_end - self.t_start)
-        # Probes ask for the same offsets over and over; the matrices are worth keeping.
-        rounded = np.round(tau, 12)
-        stacked = _sampling(rounded.tobytes(), len(self.points), self.degree, self.spacing) @ self.points
-        k = len(times)
-        position, velocity, acceleration, jerk = (stacked[i * k : (i + 1) * k] for i in range(4))
-        beyond = times - self.t_start - tau
-        out = np.abs(beyond) > 1e-9
-        if out.any():
-            position[out] += beyond[out, None] * velocity[out]
-            acceleration[out] = 0.0
-            jerk[out] = 0.0
+        # Probes ask for the same times over and over; the matrices are worth keeping.
+        matrix = _sampling_at(
+            times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
+        )
+        position, velocity, acceleration, jerk = (matrix @ self.points).reshape(4, len(times), 2)
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 

@@ -6,6 +6,7 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,15 @@ import numpy.typing as npt
 
 from repair.collision import CollisionWorld, Contact, RoadBoundary, official_shifts
 from repair.config import CheckerConfig
-from repair.kinematics import DrivenStates, direct_check, drive, official_check
+from repair.kinematics import (
+    DrivenStates,
+    body_angles,
+    clearly_drivable,
+    direct_check,
+    drive,
+    driven_states,
+    official_check,
+)
 from repair.metrics import Peaks, peaks
 from repair.occupancy import first_entry
 from repair.types import (
@@ -22,10 +31,12 @@ from repair.types import (
     Curve,
     FrenetTrajectory,
     Limits,
+    Occupancy,
     Reason,
     RepairProblem,
     Verdict,
     Violation,
+    frozen,
 )
 
 if TYPE_CHECKING:
@@ -73,6 +84,17 @@ class SplicedCurve:
         return FrenetTrajectory(times, *columns)
 
 
+@dataclass(frozen=True)
+class _Followed:
+    """The reference at all dense samples until ``t_end``; every check follows it for a step or two."""
+
+    reference: Curve
+    t_end: float
+    position: Array
+    velocity: Array
+    slip: Array
+
+
 class Checker:
     """Judges curves in one scene.
 
@@ -90,13 +112,14 @@ class Checker:
             official_shifts(scene.scenario),
         )  # fmt: skip
         self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
-        self._followed: tuple[Curve, float, Array] | None = None
+        samples = np.arange(scene.n_steps * config.substeps + 1)
+        self._times = frozen(samples * (scene.dt / config.substeps))
+        self._followed: _Followed | None = None
 
     def times(self, t_end: float) -> Array:
         """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
-        steps = min(int(np.floor(t_end / self.scene.dt + 1e-6)), self.scene.n_steps)
-        k = np.arange(steps * self.config.substeps + 1)
-        return np.asarray(k * (self.scene.dt / self.config.substeps))
+        steps = min(math.floor(t_end / self.scene.dt + 1e-6), self.scene.n_steps)
+        return self._times[: max(steps * self.config.substeps + 1, 0)]
 
     def _path(self, curve: Curve, t_end: float) -> CartesianPath:
         return self.scene.frame.cartesian(curve.sample(self.times(t_end)))
@@ -131,95 +154,132 @@ class Checker:
 
         Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
         """
-        spliced = SplicedCurve(problem.reference, curve, problem.t_rep)
-        first = max(int(np.floor(problem.t_rep / self.scene.dt + 1e-6)) - 1, 0)
-        first_sample = first * self.config.substeps
-        path = self.scene.frame.cartesian(spliced.sample(self.times(problem.t_end)[first_sample:]))
+        first = max(math.floor(problem.t_rep / self.scene.dt + 1e-6) - 1, 0) * self.config.substeps
+        times = self.times(problem.t_end)
+        after = curve.sample(times[times.searchsorted(problem.t_rep - 1e-9) :])
+        path, slip0 = self._spliced(problem, after, times, first)
         if not _finite(path):
             return _NOT_FINITE
-        states = self._drive(path, self._slip(problem.reference, problem.t_end, first_sample))
-        found = self._limits(path, problem.t_rep) if self.config.limits else []
+        slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle, slip0)
+        found = self._limits(path, len(path.t) - len(after), problem.t_rep) if self.config.limits else []
         if self.config.margin:
-            found += self._margin(problem, curve)
-        found += self._clear(states, first_sample)
+            found += self._margin(problem, curve, after)
+        found += self._clear(path.t, path.xy, orientation, first)
         # What is rejected already is not worth the drivability checker's time.
-        return Verdict(tuple(found or self._kinematics(states)))
+        return Verdict(tuple(found or self._kinematics(self._at_steps(path, slip, orientation))))
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
-        path = self._path(reference, t_end)
+        path, slip, orientation = self._follow(reference, t_end)
         if not _finite(path):
             return _NOT_FINITE
-        states = self._drive(path)
-        found = self._clear(states, 0)
+        found = self._clear(path.t, path.xy, orientation, 0)
         until = min((violation.time for violation in found), default=float("inf"))
-        return Verdict(tuple(found + self._kinematics(states, until)))
+        return Verdict(tuple(found + self._kinematics(self._at_steps(path, slip, orientation), until)))
 
-    def _slip(self, reference: Curve, t_end: float, sample: int) -> float | None:
-        """Slip angle on the reference at a dense sample; None at the start, where there is no history."""
-        if sample == 0:
-            return None
-        if self._followed is None or self._followed[0] is not reference or self._followed[1] < t_end:
-            states = self.drive(reference, t_end)
-            slip = np.arctan(self.scene.vehicle.rear / self.scene.vehicle.wheelbase * np.tan(states.steering))
-            self._followed = (reference, t_end, slip)
-        return float(self._followed[2][sample])
+    def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array]:
+        """Path, slip angle and orientation along the reference, which is kept for the repairs."""
+        sampled = reference.sample(self.times(t_end))
+        path = self.scene.frame.cartesian(sampled)
+        slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle)
+        self._followed = _Followed(reference, t_end, sampled.position, sampled.velocity, slip)
+        return path, slip, orientation
 
-    def _clear(self, states: DrivenStates, first_sample: int) -> list[Violation]:
+    def _spliced(
+        self, problem: RepairProblem, after: FrenetTrajectory, times: Array, first: int
+    ) -> tuple[CartesianPath, float | None]:
+        """The reference from dense sample ``first`` on, then ``after``; and the slip angle to begin with.
+
+        At the start there is no history, and no slip angle (None).
+        """
+        frame, late = self.scene.frame, len(times) - len(after)
+        if late == first == 0:
+            return frame.cartesian(after), None
+        kept = self._followed
+        if kept is None or kept.reference is not problem.reference or kept.t_end < problem.t_end:
+            self._follow(problem.reference, problem.t_end)
+            kept = self._followed
+        assert kept is not None
+        position = np.concatenate((kept.position[first:late], after.position))
+        velocity = np.concatenate((kept.velocity[first:late], after.velocity))
+        path = frame.carry(times[first:], position, velocity)
+        return path, None if first == 0 else float(kept.slip[first])
+
+    def _at_steps(self, path: CartesianPath, slip: Array, orientation: Array) -> DrivenStates:
+        """States at the scenario's steps, of a path that begins at one."""
+        n = self.config.substeps
+        return driven_states(
+            path.t[::n], path.xy[::n], path.speed[::n], slip[::n], orientation[::n], self.scene.vehicle
+        )
+
+    def _clear(self, t: Array, xy: Array, orientation: Array, first_sample: int) -> list[Violation]:
         """First contact with an obstacle and first departure from the road."""
         found = []
-        contact = self.world.contact(states.x, states.y, states.orientation, first_sample)
+        x, y = xy[:, 0], xy[:, 1]
+        contact = self.world.contact(x, y, orientation, first_sample)
         if contact is not None:
             behind = " from behind" if contact.from_behind else ""
             detail = f"obstacle {contact.obstacle_id}{behind}"
             found.append(Violation(Reason.COLLISION, contact.time, detail))
         if self.road is not None:
-            index = self.road.first_off_road(states.x, states.y, states.orientation)
+            index = self.road.first_off_road(x, y, orientation)
             if index is not None:
-                found.append(Violation(Reason.OFF_ROAD, float(states.t[index]), "the ego leaves the road"))
+                found.append(Violation(Reason.OFF_ROAD, float(t[index]), "the ego leaves the road"))
         return found
 
-    def _margin(self, problem: RepairProblem, curve: Curve) -> list[Violation]:
+    def _margin(self, problem: RepairProblem, curve: Curve, after: FrenetTrajectory) -> list[Violation]:
         """The paper's detectCollision on the repaired part, at the scenario's steps."""
+        if not self._enters(problem.occupancy, after):
+            return []
         samples = self.times(problem.t_end)[:: self.config.substeps]
-        entry = first_entry(problem.occupancy, curve.sample(samples[samples >= problem.t_rep - 1e-9]))
+        samples = samples[samples >= problem.t_rep - 1e-9]
+        entry = first_entry(problem.occupancy, curve.sample(samples))
         if entry is None:
             return []
-        time = float(samples[samples >= problem.t_rep - 1e-9][entry[0]])
+        time = float(samples[entry[0]])
         return [Violation(Reason.MARGIN, time, f"obstacle {problem.occupancy.ids[entry[1]]}")]
 
-    def _limits(self, path: CartesianPath, t_rep: float) -> list[Violation]:
-        limits, late = self.limits, path.t >= t_rep - 1e-9
-        reached = peaks(path, late)
+    def _enters(self, occupancy: Occupancy, dense: FrenetTrajectory) -> bool:
+        """Whether a box may be entered at a scenario's step; False is certain.
+
+        Where the boxes are tabulated at these very steps there is nothing to interpolate.
+        """
+        n, count = self.config.substeps, len(dense)
+        first = round(float(dense.t[0]) / self.scene.dt * n) if count else 0
+        skip = -first % n
+        if not len(occupancy) or count <= skip:
+            return False
+        rows = slice((first + skip) // n, (first + count - 1) // n + 1)
+        t = occupancy.t[rows]
+        inner = dense.t[skip::n]
+        if len(t) != len(inner) or max(abs(t[0] - inner[0]), abs(t[-1] - inner[-1])) > 1e-9:
+            return True
+        position = np.ascontiguousarray(dense.position[skip::n])
+        inside = (occupancy.lower[:, rows] < position) & (position < occupancy.upper[:, rows])
+        return bool((inside[..., 0] & inside[..., 1]).any())
+
+    def _limits(self, path: CartesianPath, late: int, t_rep: float) -> list[Violation]:
+        """Limits that are broken from the path's sample ``late`` on."""
+        limits, reached, more = self.limits, peaks(path, slice(late, None)), 1 + SLACK
+        v_low, v_high = reached.min_speed, reached.max_speed
+        a_low, a_high = reached.min_acceleration, reached.max_acceleration
+        lateral, total = reached.max_lateral_acceleration, reached.max_total_acceleration
         checks = (
-            (reached.min_speed < -STANDSTILL, f"reverses at {-reached.min_speed:.2f} m/s"),
-            (reached.max_speed > limits.v_max * (1 + SLACK) + 0.1, f"speed {reached.max_speed:.1f} m/s"),
-            (
-                reached.min_acceleration < limits.a_min * (1 + SLACK),
-                f"brakes at {reached.min_acceleration:.2f} m/s²",
-            ),
-            (
-                reached.max_acceleration > limits.a_max * (1 + SLACK),
-                f"accelerates at {reached.max_acceleration:.2f}",
-            ),
-            (
-                reached.max_lateral_acceleration > limits.a_lat * (1 + SLACK),
-                f"lateral acceleration {reached.max_lateral_acceleration:.2f} m/s²",
-            ),
-            (
-                reached.max_total_acceleration > limits.a_total * (1 + SLACK),
-                f"total acceleration {reached.max_total_acceleration:.2f} m/s²",
-            ),
+            (v_low < -STANDSTILL, "reverses at {:.2f} m/s", -v_low),
+            (v_high > limits.v_max * more + 0.1, "speed {:.1f} m/s", v_high),
+            (a_low < limits.a_min * more, "brakes at {:.2f} m/s²", a_low),
+            (a_high > limits.a_max * more, "accelerates at {:.2f}", a_high),
+            (lateral > limits.a_lat * more, "lateral acceleration {:.2f} m/s²", lateral),
+            (total > limits.a_total * more, "total acceleration {:.2f} m/s²", total),
         )
-        broken = [text for bad, text in checks if bad]
+        broken = [text.format(value) for bad, text, value in checks if bad]
         return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
 
-    def _kinematics(self, dense: DrivenStates, until: float = float("inf")) -> list[Violation]:
+    def _kinematics(self, states: DrivenStates, until: float = float("inf")) -> list[Violation]:
         """Direct check first; the drivability checker decides what is left before ``until``."""
-        states = dense.every(self.config.substeps)
-        if len(states) < 2:
-            return []
         scene, official = self.scene, self.config.official
+        if len(states) < 2 or (official != "always" and clearly_drivable(states, scene.dt, scene.vehicle)):
+            return []
         report = direct_check(states, scene.dt, scene.vehicle)
         open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
         open_ = open_[states.t[open_] < until]
@@ -233,4 +293,6 @@ _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not 
 
 
 def _finite(path: CartesianPath) -> bool:
+    if len(path.t) > 1 and math.isfinite(path.distance[-1] + np.add.reduce(path.heading)):
+        return True  # a point that is not finite would make the distance so
     return bool(np.isfinite(path.xy).all() and np.isfinite(path.heading).all())

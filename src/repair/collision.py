@@ -8,6 +8,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,8 +22,15 @@ if TYPE_CHECKING:
 
 __all__ = ["CollisionWorld", "Contact", "RoadBoundary", "official_shifts"]
 
+Points = npt.NDArray[np.complexfloating[Any, Any]]
+Index = npt.NDArray[np.intp]
+
 # Shapes closer than this [m] count as touching: rounding must not make us laxer than pycrcc.
 _TOUCH = 1e-6
+# Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
+_SPARE = 1e-3
+# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
+_BOX = 4.0
 
 
 class Contact(NamedTuple):
@@ -133,11 +141,29 @@ class CollisionWorld:
         self._owner = np.array(owner, dtype=np.intp)
         self._kind = np.array(kind, dtype=np.intp)
         self._step = steps
-        self._x = np.ascontiguousarray(self._track[:, :, 0])
-        self._y = np.ascontiguousarray(self._track[:, :, 1])
-        radius = np.hypot(self._track[:, :, 3], self._track[:, :, 4])
-        radius = np.where(self._kind == _RECTANGLE, radius, self._track[:, :, 3])
-        self._reach = (radius + ego_radius + _TOUCH) ** 2
+        x, y, heading, *size = np.moveaxis(self._track, 2, 0)
+        # Points and directions of the plane as complex numbers: one call where coordinates take two.
+        self._centre = _complex(x, y)
+        self._axis = _complex(np.cos(heading), np.sin(heading))
+        self._size = np.array(size)
+        radius = np.where(self._kind == _RECTANGLE, np.hypot(*size), size[0])
+        self._round = bool((self._kind != _RECTANGLE).any())
+        self._build_blocks(radius + ego_radius)
+
+    def _build_blocks(self, reach: Array) -> None:
+        """A circle around each track over each block of samples, what the ego needs included."""
+        size = self._block = 2 * self.substeps
+        count = -(-self.n_samples // size)
+        padded = np.full((3, count * size, len(self._kind)), np.nan)
+        padded[:, : self.n_samples] = self._centre.real, self._centre.imag, reach
+        x, y, padded_reach = padded.reshape(3, count, size, -1)
+        # fmin and fmax pass over the samples at which an obstacle is not there
+        middle = [0.5 * (np.fmin.reduce(v, axis=1) + np.fmax.reduce(v, axis=1)) for v in (x, y)]
+        self._block_centre = _complex(*middle)
+        away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
+        self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
+        self._block_samples = np.arange(count * size).reshape(count, size)
+        self._block_middle = self._block_samples[:, size // 2].copy()
 
     def _interpolate(self, rows: Array) -> Array:
         """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
@@ -210,40 +236,49 @@ class CollisionWorld:
         rows = slice(start, start + len(x))
         if start < 0 or rows.stop > self.n_samples:
             raise ValueError(f"samples {start} to {rows.stop} of a world of {self.n_samples}")
-        if not (np.isfinite(x).all() and np.isfinite(y).all() and np.isfinite(orientation).all()):
+        if not np.isfinite(np.array((x, y, orientation))).all():
             raise ValueError("the ego's poses are not finite")
-        dx = self._x[rows] - x[:, None]
-        dy = self._y[rows] - y[:, None]
-        k, m = np.nonzero(dx * dx + dy * dy <= self._reach[rows])
+        here = _complex(x, y)
+        k, m = self._near(here, start)
         if not len(k):
             return None
-        poses = self._track[rows][k, m]
-        kind = self._kind[m]
-        cos, sin = np.cos(orientation[k]), np.sin(orientation[k])
-        forward = cos * dx[k, m] + sin * dy[k, m]
-        left = cos * dy[k, m] - sin * dx[k, m]
-        hit = _rectangles_touch(
-            forward, left, poses[:, 2] - orientation[k], self._half, poses[:, 3], poses[:, 4]
-        )
-        if (kind != _RECTANGLE).any():
+        ego = k - start
+        turned = orientation[ego]
+        axis = _complex(np.cos(turned), -np.sin(turned))
+        seen, size = (self._centre[k, m] - here[ego]) * axis, self._size[:, k, m]
+        hit = _rectangles_touch(seen, self._axis[k, m] * axis, self._half, size)
+        if self._round:
             beyond = np.hypot(
-                np.maximum(np.abs(forward) - self._half[0], 0.0),
-                np.maximum(np.abs(left) - self._half[1], 0.0),
+                np.maximum(np.abs(seen.real) - self._half[0], 0.0),
+                np.maximum(np.abs(seen.imag) - self._half[1], 0.0),
             )
-            hit = np.where(kind == _RECTANGLE, hit, beyond <= poses[:, 3] + _TOUCH)
-            for i in np.flatnonzero(hit & (kind == _POLYGON)):
-                step = self._step[m[i]][start + k[i]]
-                pose = (x[k[i]], y[k[i]], cos[i], sin[i])
-                hit[i] = any(
-                    _polygon_touches(polygon, pose, self._half)
-                    for polygon in self._obstacles[self._owner[m[i]]].polygons[step]
-                )
-                if hit[i]:
-                    break
-        if not hit.any():
-            return None
-        first = int(np.argmax(hit))
-        return int(k[first]), int(self._owner[m[first]])
+            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[0] + _TOUCH)
+        hits = np.flatnonzero(hit)
+        for i in hits[np.lexsort((m[hits], k[hits]))].tolist() if len(hits) else ():
+            pose = (x[ego[i]], y[ego[i]], axis[i].real, -axis[i].imag)
+            if self._kind[m[i]] != _POLYGON or self._polygons_touch(int(k[i]), int(m[i]), pose):
+                return int(ego[i]), int(self._owner[m[i]])
+        return None
+
+    def _near(self, here: Points, start: int) -> tuple[Index, Index]:
+        """Samples and tracks (n,), in no order, outside of which nothing touches: one look per block."""
+        size, stop = self._block, start + len(here)
+        blocks = slice(start // size, -(-stop // size))
+        # Within a block no sample is farther than half a block from the one that is looked at.
+        at = np.minimum(np.maximum(self._block_middle[blocks] - start, 0), len(here) - 1)
+        step = float(np.maximum.reduce(np.abs(here[1:] - here[:-1]), initial=0.0))
+        offset = self._block_centre[blocks] - here[at, None]
+        near = np.abs(offset) <= self._block_reach[blocks] + size // 2 * step
+        block, track = near.nonzero()
+        if not len(block):
+            return block, track
+        samples = self._block_samples[blocks.start + block].ravel()
+        return np.minimum(np.maximum(samples, start), stop - 1), track.repeat(size)
+
+    def _polygons_touch(self, k: int, m: int, pose: tuple[float, float, float, float]) -> bool:
+        """Whether the ego at ``x, y, cos, sin`` meets a polygon of a track at a sample."""
+        polygons = self._obstacles[self._owner[m]].polygons[self._step[m][k]]
+        return any(_polygon_touches(polygon, pose, self._half) for polygon in polygons)
 
 
 _RECTANGLE, _CIRCLE, _POLYGON = range(3)
@@ -271,22 +306,36 @@ def _rows(obstacle: Obstacle) -> tuple[int, Array]:
     return _POLYGON, rows
 
 
-def _rectangles_touch(
-    forward: Array, left: Array, turn: Array, half: tuple[float, float], length: Array, width: Array
-) -> npt.NDArray[np.bool_]:
-    """Whether the ego and rectangles meet: separating axes, all arguments (n,).
+def _complex(x: Array, y: Array) -> Points:
+    """Points (or directions) of the plane as x + iy."""
+    made = np.empty(x.shape, dtype=np.complex128)
+    made.real = x
+    made.imag = y
+    return made
 
-    ``forward``, ``left`` and ``turn`` give the other rectangle's pose seen from the ego, ``length`` and
-    ``width`` its half sizes.
+
+def _parts(points: Points) -> Array:
+    """Real and imaginary part, without their signs, (2, n)."""
+    parts: Array = np.abs(np.array((points.real, points.imag)))
+    return parts
+
+
+def _rectangles_touch(
+    offset: Points, turn: Points, half: tuple[float, float], size: Array
+) -> npt.NDArray[np.bool_]:
+    """Whether the ego and rectangles meet: separating axes.
+
+    ``offset`` and ``turn`` (n,) give the other rectangle's centre and direction seen from the ego,
+    ``size`` (2, n) its half length and width.
     """
-    cos, sin = np.cos(turn), np.sin(turn)
-    along, across = np.abs(cos), np.abs(sin)
-    return np.asarray(
-        (np.abs(forward) <= half[0] + length * along + width * across + _TOUCH)
-        & (np.abs(left) <= half[1] + length * across + width * along + _TOUCH)
-        & (np.abs(cos * forward + sin * left) <= length + half[0] * along + half[1] * across + _TOUCH)
-        & (np.abs(cos * left - sin * forward) <= width + half[0] * across + half[1] * along + _TOUCH)
-    )
+    along = _parts(turn)
+    across = along[::-1]
+    from_ego = size[0] * along + size[1] * across + np.array([[half[0] + _TOUCH], [half[1] + _TOUCH]])
+    hit = np.logical_and.reduce(_parts(offset) <= from_ego, axis=0)
+    if hit.any():  # mostly one of the ego's own axes tells the two apart
+        from_other = half[0] * along + half[1] * across + size + _TOUCH
+        hit &= np.logical_and.reduce(_parts(offset * turn.conj()) <= from_other, axis=0)
+    return np.asarray(hit)
 
 
 def _polygon_touches(
@@ -335,6 +384,8 @@ class RoadBoundary:
         outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
         self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
         shapely.prepare(self.region)
+        # More than the rounding of any coordinate of the region.
+        self._spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
 
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
@@ -345,10 +396,50 @@ class RoadBoundary:
         x, y, orientation : (K,) array
             Centre [m] and orientation [rad] of the ego.
         """
+        known = self._surely_inside(x, y, orientation)
+        if known.all():
+            return None
+        unsure = np.flatnonzero(~known)
+        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
+        return None if inside.all() else int(unsure[np.argmin(inside)])
+
+    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
+        """Whether polygons (K, V, 2) lie properly inside of the region."""
         import shapely
 
-        inside = shapely.contains_properly(self.region, shapely.polygons(self._outline(x, y, orientation)))
-        return None if inside.all() else int(np.argmin(inside))
+        return np.asarray(shapely.contains_properly(self.region, shapely.polygons(outlines)))
+
+    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
+        """Poses (K,) that lie inside because a larger box does; False says nothing.
+
+        One box, turned like the pose in its middle, holds several consecutive poses: asking about
+        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
+        a pose turned by an angle t reaches farther, at most size * |t|.
+        """
+        count = len(x)
+        known = np.zeros(count, dtype=np.bool_)
+        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
+        if not np.isfinite(np.array((x, y, orientation))).all():
+            return known
+        size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
+        if size < 2:
+            return known
+        pose = _grouping(count, size)
+        middle = pose[size // 2]
+        centre = _complex(x, y)
+        heading, origin = orientation[middle], centre[middle]
+        axis = _complex(np.cos(heading), np.sin(heading))
+        seen = ((centre[pose] - origin) * axis.conj()).view(np.float64)
+        turn = np.maximum.reduce(np.abs(orientation[pose] - heading), axis=0)
+        half = self._corners[0] + self._spare + turn[:, None] * self._corners[0, ::-1]
+        sides = np.empty((len(middle), 4))
+        sides[:, :2] = np.minimum.reduce(seen, axis=0).reshape(-1, 2) - half
+        sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
+        corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
+        corners = corners * axis[:, None] + origin[:, None]
+        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
+        known[pose[:, inside] if not inside.all() else slice(None)] = True
+        return known
 
     def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
         """Whether the ego is off the road already at this pose."""
@@ -393,6 +484,20 @@ class RoadBoundary:
                 corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
                 self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
         return self._triangles is not False
+
+
+# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
+_MOST = 32
+_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
+
+
+@lru_cache(maxsize=256)
+def _grouping(count: int, size: int) -> npt.NDArray[np.intp]:
+    """Indices (size, G) of consecutive poses in groups; the last pose fills up the last group."""
+    groups = np.minimum(np.arange(-(-count // size) * size), count - 1).reshape(-1, size)
+    by_place = np.ascontiguousarray(groups.T)
+    by_place.setflags(write=False)
+    return by_place
 
 
 def _section_outlines(network: Any) -> list[Array]:

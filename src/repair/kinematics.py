@@ -33,8 +33,11 @@ __all__ = [
     "DrivenStates",
     "KinematicReport",
     "OfficialReport",
+    "body_angles",
+    "clearly_drivable",
     "direct_check",
     "drive",
+    "driven_states",
     "official_check",
     "to_ks_states",
 ]
@@ -56,6 +59,8 @@ _ACCEPT = np.array([np.inf, 0.95, 0.98, 0.9, 0.9, 0.5, 0.4])[:, None]
 # and the optimiser, which overshoots, stays there if that is already better than its start at zero:
 # from half of the limit on.
 _ENGINE = 0.45
+# clearly_drivable stays this much below a limit, so that rounding cannot make it laxer.
+_SURE = 1.0 - 1e-9
 # The official integrator's error is relative to the coordinates; far from the origin [m] it hides the
 # cost's slope from the optimiser.
 _FAR = 5000.0
@@ -175,12 +180,32 @@ def drive(
         Where ``distance`` does not grow, orientation and steering are held: a vehicle at rest does
         not turn, whatever the path's heading does there.
     """
-    step = np.diff(distance)
+    slip, orientation = body_angles(heading, speed, distance, vehicle, slip0)
+    return driven_states(t, xy, speed, slip, orientation, vehicle)
+
+
+def body_angles(
+    heading: Array, speed: Array, distance: Array, vehicle: Vehicle, slip0: float | None = None
+) -> tuple[Array, Array]:
+    """Slip angle and orientation (K,) [rad] along a path; arguments and rules as in :func:`drive`."""
+    step = distance[1:] - distance[:-1]
+    turn = heading[1:] - heading[:-1]
     moving = step > 1e-9
+    if moving.all():
+        if not np.minimum.reduce(speed) > 0.0:
+            step = np.copysign(step, speed[1:] + speed[:-1])
+        slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+        return slip, heading - slip
     step = np.where(moving, np.copysign(step, speed[1:] + speed[:-1]), 0.0)
-    turn = np.where(moving, np.diff(heading), 0.0)
+    turn = np.where(moving, turn, 0.0)
     slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
-    orientation = heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
+    return slip, heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
+
+
+def driven_states(
+    t: Array, xy: Array, speed: Array, slip: Array, orientation: Array, vehicle: Vehicle
+) -> DrivenStates:
+    """States at samples of which :func:`body_angles` gave the angles: all of them, or every n-th."""
     steering = np.arctan(vehicle.wheelbase / vehicle.rear * np.tan(slip))
     return DrivenStates(t, xy[:, 0], xy[:, 1], steering, speed * np.cos(slip), orientation)
 
@@ -197,21 +222,25 @@ def _slip_angle(
     """
     if slip0 is None:
         first = int(np.argmax(moving)) if moving.any() else -1
-        bend = rear * turn[first] / step[first] if first >= 0 else 0.0
-        slip0 = float(np.arcsin(np.clip(bend, -0.95, 0.95)))
+        bend = float(rear * turn[first] / step[first]) if first >= 0 else 0.0
+        slip0 = float(np.arcsin(min(max(bend, -0.95), 0.95)))
     if not len(step):
         return np.array([slip0])
-    ratio = step / (2.0 * rear)
-    half = 0.5 * turn * np.tanh(ratio) / np.where(moving, ratio, 1.0)
+    ratio = step * (0.5 / rear)
+    # Where nothing moves, nothing turns: a ratio of 1 there only avoids the division by zero.
+    half = 0.5 * turn * np.tanh(ratio) / (ratio + ~moving)
     rotation = half.copy()
     rotation[1:] += half[:-1]
-    decay = np.exp(-step / rear)
     value = float(np.tan(0.5 * slip0))
-    values = []
-    for tangent, factor in zip(np.tan(0.5 * rotation).tolist(), decay.tolist(), strict=True):
-        value = factor * (value + tangent) / (1.0 - value * tangent)
-        values.append(value)
-    return np.concatenate(([slip0], 2.0 * np.arctan(values) + half))
+    tangents, decay = np.tan(0.5 * rotation).tolist(), np.exp(-2.0 * ratio).tolist()
+    slip = np.empty(len(step) + 1)
+    slip[0] = slip0
+    slip[1:] = [
+        value := factor * (value + tangent) / (1.0 - value * tangent)
+        for tangent, factor in zip(tangents, decay, strict=True)
+    ]
+    slip[1:] = 2.0 * np.arctan(slip[1:]) + half
+    return slip
 
 
 def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> KinematicReport:
@@ -268,35 +297,76 @@ def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> Kinematic
     return KinematicReport(ok, margin, worst, use)
 
 
+def clearly_drivable(states: DrivenStates, dt: float, vehicle: Vehicle) -> bool:
+    """Whether :func:`direct_check` accepts every transition: True implies it, False says nothing.
+
+    Bounds over the whole trajectory stand in for those of the single transitions, which leaves few
+    calls; nearly all trajectories that are good are good by these as well.
+    """
+    delta, v = states.steering, states.speed
+    _, steering, speed, acceleration, friction, position, orientation = _ACCEPT[:, 0].tolist()
+    change = v[1:] - v[:-1]
+    slowest, fastest = float(np.minimum.reduce(v)), float(np.maximum.reduce(v))
+    fall, rise = float(np.minimum.reduce(change)), float(np.maximum.reduce(change))
+    if fastest > vehicle.v_switch:
+        engine = _ENGINE * vehicle.a_max * vehicle.v_switch / fastest
+    else:
+        engine = acceleration * vehicle.a_max
+    lateral = v * v * np.tan(delta) / vehicle.wheelbase
+    total = (change * change) / (dt * dt) + (lateral * lateral)[:-1]
+    within = (
+        float(np.maximum.reduce(np.abs(delta))) <= _SURE * steering * vehicle.steering_max
+        and fastest + max(rise, 0.0) <= _SURE * speed * vehicle.v_max
+        and slowest + min(fall, 0.0) >= _SURE * speed * vehicle.v_min
+        and rise <= _SURE * engine * dt
+        and -fall <= _SURE * acceleration * vehicle.a_max * dt
+        and float(np.maximum.reduce(total)) <= (_SURE * friction * vehicle.a_max) ** 2
+        and float(np.maximum.reduce(np.abs((states.x, states.y)), axis=None)) <= _FAR
+    )
+    if not within:
+        return False
+    shift, turn = _errors(states, dt, vehicle)
+    return bool(
+        np.maximum.reduce(shift) <= _SURE * position * POSITION_TOLERANCE
+        and np.maximum.reduce(turn) <= _SURE * orientation * ORIENTATION_TOLERANCE
+    )
+
+
 def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:
     """Error of the simulated next state: of the rear axle's position (larger axis) and the orientation."""
-    psi = states.orientation
+    psi, delta = states.orientation, states.steering
     most = dt * _STEERING_RATE * vehicle.steering_rate_max
-    delta = states.steering[:-1]
-    delta_end = delta + np.clip(np.diff(states.steering), -most, most)
-    turned, dx, dy = _integrate(delta, delta_end, states.speed, psi[:-1], dt, vehicle.wheelbase)
-    x = states.x - vehicle.rear * np.cos(psi)
-    y = states.y - vehicle.rear * np.sin(psi)
-    return np.maximum(np.abs(np.diff(x) - dx), np.abs(np.diff(y) - dy)), np.abs(np.diff(psi) - turned)
+    change = np.minimum(np.maximum(delta[1:] - delta[:-1], -most), most)
+    turned, moved = _integrate(delta[:-1], change, states.speed, psi[:-1], dt, vehicle.wheelbase)
+    axle = np.array((states.x, states.y)) - vehicle.rear * np.array((np.cos(psi), np.sin(psi)))
+    shift = np.abs(axle[:, 1:] - axle[:, :-1] - moved)
+    return np.maximum(shift[0], shift[1]), np.abs(psi[1:] - psi[:-1] - turned)
+
+
+# Runge-Kutta of order 4 over a step on which steering angle and speed are linear in time: weights of
+# the start, the middle and the end in the turn until each of the three, and in the way.
+_TURN = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24.0
+_WAY = np.array([[1.0], [2.0], [1.0]]) / 6.0  # of the sum of both speeds in the middle
+_MEAN = np.array([[1.0], [0.5], [1.0]])
 
 
 def _integrate(
-    delta: Array, delta_end: Array, v: Array, psi: Array, dt: float, wheelbase: float
-) -> tuple[Array, Array, Array]:
-    """Change of orientation and rear-axle position over each transition at constant inputs, each (T - 1,).
+    delta: Array, change: Array, v: Array, psi: Array, dt: float, wheelbase: float
+) -> tuple[Array, Array]:
+    """Change of orientation (T - 1,) and rear-axle position (2, T - 1) at constant inputs.
 
-    Steering angle and speed are linear in time, so that Runge-Kutta of order 4 becomes Simpson's rule,
-    first for the orientation (and its value in the middle), then for the position. ``v`` is (T,), the
-    other arrays are (T - 1,).
+    Steering angle (``delta`` and its ``change``) and speed are linear in time, so that Runge-Kutta
+    becomes Simpson's rule, first for the orientation (and its value in the middle), then for the
+    position. ``v`` is (T,), the other arrays are (T - 1,).
     """
     v_start, v_end = v[:-1], v[1:]
-    v_mid = 0.5 * (v_start + v_end)
-    tangent = np.tan(np.stack((delta, 0.5 * (delta + delta_end), delta_end)))
-    start, mid, end = tangent * np.stack((v_start, v_mid, v_end)) * (dt / wheelbase)
-    turned = (start + 4.0 * mid + end) / 6.0
-    angle = np.stack((psi, psi + (5.0 * start + 8.0 * mid - end) / 24.0, psi + turned))
-    weighted = np.stack((v_start, 4.0 * v_mid, v_end)) * (dt / 6.0)
-    return turned, (weighted * np.cos(angle)).sum(axis=0), (weighted * np.sin(angle)).sum(axis=0)
+    speeds = np.array((v_start, v_start + v_end, v_end))
+    tangent = np.tan(np.array((delta, delta + 0.5 * change, delta + change)))
+    turned = _TURN @ (tangent * speeds * (_MEAN * (dt / wheelbase)))
+    angle = turned + psi
+    way = speeds * (_WAY * dt)
+    moved = np.add.reduce(np.array((np.cos(angle) * way, np.sin(angle) * way)), axis=1)
+    return turned[2], moved
 
 
 def official_check(

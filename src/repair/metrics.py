@@ -28,36 +28,32 @@ class Peaks:
     max_total_acceleration: float
 
 
-def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | None = None) -> Peaks:
+def peaks(path: CartesianPath, keep: npt.NDArray[np.bool_] | slice | None = None) -> Peaks:
     """Peaks over the samples that ``keep`` selects (all by default).
 
     The longitudinal acceleration is the derivative of the signed speed, the lateral one speed times
     the rate of the heading, both by differences over the dense, equally spaced samples.
     """
-    if len(path.t) < 3:
-        longitudinal: Array = np.zeros(len(path.t))
-        lateral = longitudinal
-    else:
-        step = path.t[1] - path.t[0]
-        longitudinal = _rate(path.speed, step)
-        lateral = path.speed * _rate(path.heading, step)
-    speed = path.speed
+    measured = np.zeros((4, len(path.t)))
+    measured[0] = path.speed
+    if len(path.t) >= 3:
+        motion = np.array((path.speed, path.heading))
+        longitudinal, turning = _rate(motion, path.t[1] - path.t[0])
+        lateral = path.speed * turning
+        measured[1] = longitudinal
+        np.abs(lateral, out=measured[2])
+        np.hypot(longitudinal, lateral, out=measured[3])
     if keep is not None:
-        longitudinal, lateral, speed = longitudinal[keep], lateral[keep], speed[keep]
-    return Peaks(
-        float(speed.min()),
-        float(speed.max()),
-        float(longitudinal.min()),
-        float(longitudinal.max()),
-        float(np.abs(lateral).max()),
-        float(np.hypot(longitudinal, lateral).max()),
-    )
+        measured = measured[:, keep]
+    low = np.minimum.reduce(measured[:2], axis=1).tolist()
+    high = np.maximum.reduce(measured, axis=1).tolist()
+    return Peaks(low[0], high[0], low[1], *high[1:])
 
 
 def _rate(values: Array, step: float) -> Array:
-    """Derivative of equally spaced samples: central differences, one-sided at the ends."""
+    """Derivative of equally spaced samples (..., K): central differences, one-sided at the ends."""
     result = np.empty_like(values)
-    result[1:-1] = (values[2:] - values[:-2]) / (2.0 * step)
-    result[0] = (values[1] - values[0]) / step
-    result[-1] = (values[-1] - values[-2]) / step
+    result[..., 1:-1] = (values[..., 2:] - values[..., :-2]) / (2.0 * step)
+    result[..., 0] = (values[..., 1] - values[..., 0]) / step
+    result[..., -1] = (values[..., -1] - values[..., -2]) / step
     return result

@@ -53,16 +53,9 @@ def test_rectangles_as_in_pycrcc():
     n = 4000
     ego = np.column_stack((rng.uniform(-5, 5, (n, 2)), rng.uniform(-4, 4, n)))
     other = np.column_stack((rng.uniform(-5, 5, (n, 2)), rng.uniform(-4, 4, n), rng.uniform(0.1, 4, (n, 2))))
-    d = other[:, :2] - ego[:, :2]
-    c, s = np.cos(ego[:, 2]), np.sin(ego[:, 2])
-    ours = _rectangles_touch(
-        c * d[:, 0] + s * d[:, 1],
-        c * d[:, 1] - s * d[:, 0],
-        other[:, 2] - ego[:, 2],
-        HALF,
-        other[:, 3],
-        other[:, 4],
-    )
+    offset = (other[:, :2] - ego[:, :2]) @ [1.0, 1j] * np.exp(-1j * ego[:, 2])
+    turn = np.exp(1j * (other[:, 2] - ego[:, 2]))
+    ours = _rectangles_touch(offset, turn, HALF, other[:, 3:].T)
     theirs = [
         RectOBB(*HALF, e[2], e[0], e[1]).collide(RectOBB(o[3], o[4], o[2], o[0], o[1]))
         for e, o in zip(ego, other, strict=True)

@@ -141,7 +141,7 @@ class FrenetFrame:
         # fmax/fmin send NaN to segment 0; the offset stays NaN and so does the result
         where = np.floor(query * self._inverse) + 1.0
         index = np.fmin(np.fmax(where, 0.0), self._last).astype(np.intp)
-        return index, query - self._knots[index]
+        return index, query - self._knots.take(index)
 
     def _derivatives(self, s: npt.ArrayLike, highest: int) -> tuple[list[Array], Any]:
         """Position and derivatives by s up to ``highest``, each (2, ...), and the segment."""
@@ -168,7 +168,7 @@ class FrenetFrame:
         return self._continuous(np.arctan2(y1, x1), index)
 
     def _continuous(self, angle: Array, index: Any) -> Array:
-        turns = np.rint((self._turns[index] - angle) / (2.0 * np.pi))
+        turns = np.rint((self._turns.take(index) - angle) / (2.0 * np.pi))
         return np.asarray(angle + 2.0 * np.pi * turns)
 
     def curvature(self, s: npt.ArrayLike) -> Array:
@@ -269,22 +269,41 @@ class FrenetFrame:
 
     def cartesian(self, trajectory: FrenetTrajectory) -> CartesianPath:
         """Carry a Frenet trajectory into the plane; see :class:`CartesianPath`."""
-        s, lateral = trajectory.position[:, 0], trajectory.position[:, 1]
-        ((x, y), (x1, y1), (x2, y2)), index = self._derivatives(s, 2)
+        return self.carry(trajectory.t, trajectory.position, trajectory.velocity)
+
+    def carry(self, t: Array, position: Array, velocity: Array) -> CartesianPath:
+        """As :meth:`cartesian`, of the only columns (K, 2) that it needs.
+
+        Every repair that is tried comes through here: calls into NumPy are what it costs.
+        """
+        s, s_rate, sideways = position[:, 0], velocity[:, 0], velocity[:, 1]
+        index, u = self._locate(s)
+        c3, c2, c1, c0 = self._coefficients.take(index, axis=2)
+        c3u = c3 * u
+        axis = ((c3u + c2) * u + c1) * u + c0
+        second = 3.0 * c3u + c2  # half of it
+        tangent = (second + c2) * u + c1
+        x1, y1 = tangent[0], tangent[1]
         square = x1 * x1 + y1 * y1
-        norm = np.sqrt(square)
-        xy = _pairs(x - lateral * y1 / norm, y + lateral * x1 / norm)
-        curvature = (x1 * y2 - y1 * x2) / (square * norm)
-        forward = trajectory.velocity[:, 0] * (1.0 - curvature * lateral)
-        sideways = trajectory.velocity[:, 1]
-        sign = np.where(trajectory.velocity[:, 0] < 0.0, -1.0, 1.0)
-        speed = sign * np.hypot(forward, sideways)
+        offset = position[:, 1] / np.sqrt(square)
+        plane = np.empty_like(axis)
+        np.subtract(axis[0], offset * y1, out=plane[0])
+        np.add(axis[1], offset * x1, out=plane[1])
+        bend = (x1 * second[1] - y1 * second[0]) / square  # half of the curvature times the tangent's length
+        forward = s_rate * (1.0 - 2.0 * bend * offset)
+        speed = np.hypot(forward, sideways)
         base = self._continuous(np.arctan2(y1, x1), index)
-        slip = np.arctan2(sign * sideways, sign * forward)
-        heading = _held(base + slip, base, np.abs(speed) >= STANDSTILL)
-        chords = np.hypot(*np.diff(xy, axis=0).T) if len(xy) > 1 else np.zeros(0)
-        distance = np.concatenate([[0.0], np.cumsum(chords)]) if len(xy) else np.zeros(0)
-        return CartesianPath(trajectory.t, xy, heading, speed, distance)
+        if s_rate.size and np.minimum.reduce(s_rate) >= 0.0:
+            slip = np.arctan2(sideways, forward)
+        else:
+            sign = np.where(s_rate < 0.0, -1.0, 1.0)
+            slip = np.arctan2(sign * sideways, sign * forward)
+            speed *= sign
+        heading = _held(base + slip, base, np.abs(speed))
+        step = plane[:, 1:] - plane[:, :-1]
+        distance = np.zeros(len(s))
+        np.add.accumulate(np.hypot(step[0], step[1]), out=distance[1:])
+        return CartesianPath(t, plane.T, heading, speed, distance)
 
 
 def _pairs(x: Array, y: Array) -> Array:
@@ -295,14 +314,23 @@ def _pairs(x: Array, y: Array) -> Array:
     return made
 
 
-def _held(heading: Array, fallback: Array, moving: npt.NDArray[np.bool_]) -> Array:
+def _held(heading: Array, fallback: Array, pace: Array) -> Array:
     """Headings with those of standing samples taken from the last (else the first) moving one."""
-    if moving.all():
-        return np.unwrap(heading)
+    if np.minimum.reduce(pace, initial=np.inf) >= STANDSTILL:
+        return _unwrapped(heading)
+    moving = pace >= STANDSTILL
     if not moving.any():
         return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
-    return np.unwrap(heading[np.where(last < 0, int(np.argmax(moving)), last)])
+    return _unwrapped(heading[np.where(last < 0, int(np.argmax(moving)), last)])
+
+
+def _unwrapped(angle: Array) -> Array:
+    """:func:`numpy.unwrap`, which is slow, only where there is something to unwrap."""
+    jump = angle[1:] - angle[:-1]
+    if jump.size and not np.maximum.reduce(np.abs(jump)) < np.pi:
+        return np.asarray(np.unwrap(angle))
+    return angle
 
 
 def _clean(points: npt.ArrayLike) -> Array:

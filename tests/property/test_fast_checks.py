@@ -1,0 +1,161 @@
+"""The checker's short cuts: what they settle, the full tests settle in the same way."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from repair.collision import CollisionWorld, RoadBoundary, _grouping
+from repair.kinematics import DrivenStates, clearly_drivable, direct_check, drive
+from repair.scene.obstacles import Obstacle
+from repair.scene.vehicle import load_vehicle
+
+EGO = load_vehicle(1)
+
+
+def driven(rng, n=60, spread=5.0):
+    """Poses (n,) along a random drive through the middle of [0, 60] x [-spread, spread]."""
+    speed = rng.uniform(0.0, 0.8) * (1.0 + 0.5 * np.sin(np.linspace(0, rng.uniform(0, 4), n)))
+    heading = rng.uniform(-np.pi, np.pi) * (rng.random() < 0.3) + np.cumsum(rng.normal(0, 0.03) + np.zeros(n))
+    x = rng.uniform(5, 30) + np.cumsum(speed * np.cos(heading))
+    y = rng.uniform(-spread, spread) + np.cumsum(speed * np.sin(heading))
+    return x, y, heading + rng.normal(0, 0.05, n)
+
+
+# ------------------------------------------------------------------- the road
+
+
+def lanelet(left, right):
+    fields = dict.fromkeys(("adj_left", "adj_left_same_direction", "adj_right", "adj_right_same_direction"))
+    return SimpleNamespace(lanelet_id=1, left_vertices=left, right_vertices=right, **fields)
+
+
+def ragged_road(rng):
+    """A road along x whose edges have spikes into it."""
+    x = np.sort(rng.uniform(-20, 90, 40))
+    sides = []
+    for side in (1.0, -1.0):
+        y = side * (rng.uniform(2, 7) + rng.uniform(0, 1, 40))
+        spikes = rng.random(40) < rng.choice([0.0, 0.1])
+        y[spikes] -= side * rng.uniform(0, 3, spikes.sum())
+        sides.append(np.column_stack((x, y)))
+    network = SimpleNamespace(lanelets=[lanelet(*sides)])
+    return RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_box_around_several_poses_is_on_the_road_only_if_they_are(seed):
+    rng = np.random.default_rng(seed)
+    road = ragged_road(rng)
+    x, y, heading = driven(rng, int(rng.integers(1, 90)), 3.0)
+    inside = road._inside(road._outline(x, y, heading))
+    assert inside[road._surely_inside(x, y, heading)].all()
+    first = road.first_off_road(x, y, heading)
+    assert first == (None if inside.all() else int(np.argmin(inside)))
+
+
+def test_most_poses_on_a_wide_road_are_settled_by_boxes():
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -1))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    x = np.linspace(0.0, 60.0, 161)
+    assert road._surely_inside(x, np.sin(x / 9.0), 0.1 * np.cos(x / 9.0)).all()
+
+
+def test_the_last_pose_fills_up_the_last_group():
+    assert _grouping(10, 4).T.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 9, 9]]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
+def test_poses_that_are_nowhere_are_off_the_road(bad):
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -1))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    for column in range(2):
+        poses = np.zeros((3, 20))
+        poses[0] = np.linspace(0.0, 5.0, 20)
+        poses[column, 7] = bad
+        assert road.first_off_road(*poses) == 7
+
+
+# -------------------------------------------------------------------- contact
+
+
+def crowd(rng, steps=20):
+    """Obstacles of every kind that drive about, some of them only for a while."""
+    obstacles = []
+    for name in range(int(rng.integers(0, 7))):
+        t = np.arange(steps + 1)[:, None] * 0.1
+        centre = rng.uniform((0, -6), (45, 6)) + rng.normal(0, 8, 2) * t
+        heading = rng.uniform(-4, 4) + rng.normal(0, 1) * t
+        size = np.tile(rng.uniform(0.2, 3.0, 2), (steps + 1, 1))
+        rows = np.hstack((centre, heading, size))
+        if rng.random() < 0.4:
+            rows[rng.random(steps + 1) < rng.choice([0.2, 0.8])] = np.nan
+        kind = rng.choice(["rectangle", "circle", "polygon"])
+        corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * size[0]
+        polygons = tuple(() if np.isnan(row).any() else (corners + row[:2],) for row in rows)
+        obstacles.append(Obstacle(
+            id=name, kind="car", role=str(rng.choice(["dynamic", "set_based"])),
+            vertices=np.zeros((steps + 1, 4, 2)), states=np.column_stack((rows[:, :3], rows[:, 3])),
+            rectangles=rows if kind == "rectangle" else None,
+            circles=rows[:, [0, 1, 3]] if kind == "circle" else None,
+            polygons=polygons if kind == "polygon" else (),
+        ))  # fmt: skip
+    return obstacles
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_looking_at_blocks_drops_no_contact(seed):
+    rng = np.random.default_rng(seed)
+    substeps = int(rng.integers(1, 6))
+    shifts = {name: int(rng.integers(-3, 4)) for name in range(7)}
+    world = CollisionWorld(crowd(rng), EGO, 0.1, 20, substeps, shifts)
+    start = int(rng.integers(0, world.n_samples))
+    x, y, heading = driven(rng, int(rng.integers(1, world.n_samples - start + 1)))
+    found = world._first(x, y, heading, start)
+    k, m = np.indices((len(x), len(world._kind))).reshape(2, -1)
+    world._near = lambda here, start: (k + start, m)
+    assert world._first(x, y, heading, start) == found
+
+
+# ----------------------------------------------------------------- kinematics
+
+
+def ride(rng, vehicle, dt):
+    """States along a random drive, from gentle to impossible."""
+    n = int(rng.integers(2, 40))
+    speed = rng.uniform(-2, 20) + np.cumsum(rng.normal(0, rng.choice([0.1, 0.1, 1.0, 10.0]), n)) * dt
+    curvature = np.cumsum(rng.normal(0, rng.choice([1e-4, 1e-3, 0.01, 0.1]), n))
+    step = speed * dt
+    heading = np.cumsum(curvature * step)
+    xy = np.cumsum(np.column_stack((np.cos(heading), np.sin(heading))) * step[:, None], axis=0)
+    xy += rng.choice([0.0, 0.0, 0.0, 4990.0, 1e6]) + rng.normal(0, rng.choice([0.0, 0.0, 0.003]), (n, 2))
+    distance = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))))
+    return drive(np.arange(n) * dt, xy, heading, speed, distance, vehicle)
+
+
+@settings(max_examples=500, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 3, 4]))
+def test_clearly_drivable_is_drivable_step_by_step(seed, type_id):
+    rng = np.random.default_rng(seed)
+    vehicle, dt = load_vehicle(type_id), float(rng.choice([0.04, 0.1, 0.2]))
+    states = ride(rng, vehicle, dt)
+    if clearly_drivable(states, dt, vehicle):
+        assert direct_check(states, dt, vehicle).ok.all()
+
+
+@pytest.mark.parametrize("name", ["x", "y", "steering", "speed", "orientation"])
+def test_what_is_not_a_number_is_not_clearly_drivable(name):
+    t = np.arange(9) * 0.1
+    columns = {"x": 10.0 * t, "y": 0 * t, "steering": 0 * t, "speed": 0 * t + 10.0, "orientation": 0 * t}
+    assert clearly_drivable(DrivenStates(t, **columns), 0.1, EGO)
+    for k in range(9):
+        broken = columns | {name: np.where(np.arange(9) == k, np.nan, columns[name])}
+        assert not clearly_drivable(DrivenStates(t, **broken), 0.1, EGO)

@@ -1,0 +1,105 @@
+"""The checker on a straight road: what it keeps and skips changes no verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests import roads
+
+from repair.api import prepare
+from repair.bspline import UniformBSpline, fit_to_curve
+from repair.checker import Checker, SplicedCurve
+from repair.config import load_config
+from repair.occupancy import first_entry
+from repair.scene.commonroad import load_scene
+from repair.types import frozen
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory):
+    """A slower car ahead on one lane."""
+    path = tmp_path_factory.mktemp("road") / "scenario.xml"
+    path.write_text(roads.scenario(), encoding="utf-8")
+    overrides = ["reference.source=constant", "checker.official=never", "checker.margin=true"]
+    return prepare(load_scene(path), load_config(overrides=overrides))
+
+
+def curves(prepared, problem, n, seed):
+    """Curves from ``problem.start`` on that brake and swerve, gently or not."""
+    rng = np.random.default_rng(seed)
+    count = max(int(np.ceil((problem.t_end - problem.t_rep) / 0.4 - 1e-9)), 1) + 3
+    along = fit_to_curve(prepared.reference, problem.t_rep, count, 3, 0.4)
+    for _ in range(n):
+        points = np.array(along.points)
+        past = np.arange(1, count - 2)
+        points[3:, 0] -= 0.08 * rng.choice([2.5, 8.0]) * rng.uniform(0.7, 1) * past**2
+        points[3:, 1] += rng.choice([0.0, 0.05, 0.5]) * rng.normal() * past
+        yield UniformBSpline(problem.t_rep, 0.4, 3, frozen(points))
+
+
+def judged_in_full(checker, problem, curve):
+    """The verdict's words by the full tests alone, on the curve spliced as everybody else does."""
+    spliced = SplicedCurve(problem.reference, curve, problem.t_rep)
+    times = checker.times(problem.t_end)
+    first = max(int(problem.t_rep / checker.scene.dt + 1e-6) - 1, 0) * checker.config.substeps
+    states = checker.drive(spliced, problem.t_end)
+    late = slice(first, None)
+    words = []
+    if checker._limits(checker._path(spliced, problem.t_end), int((times < problem.t_rep - 1e-9).sum()), 0.0):
+        words.append("limits")
+    steps = times[:: checker.config.substeps]
+    if first_entry(problem.occupancy, curve.sample(steps[steps >= problem.t_rep - 1e-9])) is not None:
+        words.append("margin")
+    poses = states.x[late], states.y[late], states.orientation[late]
+    if checker.world.contact(*poses, first) is not None:
+        words.append("collision")
+    if not checker.road._inside(checker.road._outline(*poses)).all():
+        words.append("off_road")
+    return tuple(words)
+
+
+@pytest.mark.parametrize("t_rep", [0.0, 0.1, 0.25, 1.6])
+def test_short_cuts_change_no_verdict(prepared, t_rep):
+    problem = replace(prepared.source.at(0.0)[0], t_rep=t_rep)
+    seen = set()
+    for curve in curves(prepared, problem, 40, 3):
+        found = prepared.checker.check(problem, curve).reasons
+        assert tuple(word for word in found if word != "kinematics") == judged_in_full(
+            prepared.checker, problem, curve
+        )
+        seen.update(found or ("ok",))
+    assert {"limits", "off_road"} <= seen
+    assert ("ok" in seen) == (t_rep < 1.0)  # later it is too late
+
+
+def test_what_is_kept_of_one_reference_is_not_used_for_another(prepared):
+    checker = Checker(prepared.scene, prepared.limits, prepared.checker.config)
+    problem = prepared.source.at(0.8)[0]
+    curve = next(curves(prepared, problem, 1, 0))
+    other = replace(problem, reference=fit_to_curve(prepared.reference, 0.0, 20, 3, 0.5))
+    for asked in (problem, other, replace(problem, t_end=problem.t_end - 1.0), problem):
+        fresh = Checker(prepared.scene, prepared.limits, prepared.checker.config)
+        assert checker.check(asked, curve) == fresh.check(asked, curve)
+        assert checker._followed.reference is asked.reference
+
+
+def test_times_are_the_scenario_steps_and_what_lies_between(prepared):
+    times = prepared.checker.times(0.25)
+    assert times == pytest.approx(np.arange(9) * 0.025)
+    assert len(prepared.checker.times(1e9)) == prepared.scene.n_steps * 4 + 1
+    with pytest.raises(ValueError, match="read-only"):
+        times[0] = 1.0
+
+
+def test_a_curve_that_is_not_finite_is_no_trajectory(prepared):
+    problem = prepared.source.at(0.4)[0]
+    curve = next(curves(prepared, problem, 1, 0))
+    for bad in (np.nan, np.inf):
+        points = np.array(curve.points)
+        points[5, 0] = bad
+        with np.errstate(invalid="ignore"):
+            verdict = prepared.checker.check(problem, replace(curve, points=points))
+        assert verdict.reasons == ("kinematics",)
+        assert "not finite" in verdict.violations[0].detail
