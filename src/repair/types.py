@@ -208,9 +208,8 @@ class Occupancy:
     def select(self, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Occupancy:
         """The obstacles that ``keep`` names."""
         rows = np.arange(len(self))[keep]
-        return Occupancy(
-            self.t, self.ids[rows], self.lower.take(rows, axis=0), self.upper.take(rows, axis=0), self.static[rows]
-        )  # fmt: skip
+        lower, upper = (box.take(rows, axis=0) for box in (self.lower, self.upper))
+        return Occupancy(self.t, self.ids[rows], lower, upper, self.static[rows])
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -260,7 +259,7 @@ class Passing:
         grid = self.guide.t
         step = grid[1] - grid[0] if len(grid) > 1 else 1.0
         index = np.rint((query - grid[0]) / step).astype(np.intp)
-        return self.side.take(index, axis=1, mode="clip")
+        return np.asarray(self.side.take(index, axis=1, mode="clip"))
 
 
 @dataclass(frozen=True)

@@ -239,14 +239,15 @@ class EgoBackend:
             led = minimum.points
             clear = _closest(pairs, led) >= 0.0
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
-            if clear and (
-                cap is None
-                or (led[1:, 0] - led[:-1, 0] <= 1.02 * self.spacing * _bend_speed(problem, led)).all()
-            ):
+            if clear and (cap is None or self._slow_enough(problem, led)):
                 break
             if not clear:
                 collision *= 2.0
         return minimum, pairs, cap, rounds
+
+    def _slow_enough(self, problem: RepairProblem, points: Array) -> bool:
+        allowed = 1.02 * self.spacing * _bend_speed(problem, points)
+        return bool((points[1:, 0] - points[:-1, 0] <= allowed).all())
 
     def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
         """Where the guide leads the control points (the reference where there is no guide)."""

@@ -63,9 +63,8 @@ def _structure(
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     factors = frozen(factor.reshape(-1, 10))
     band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
-    return _Structure(
-        frozen(stack), frozen(stack[:, first:last]), frozen(smooth), width, frozen(band), factors, where.ravel()
-    )  # fmt: skip
+    free = frozen(stack[:, first:last])
+    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, where.ravel())
 
 
 class Point(NamedTuple):
