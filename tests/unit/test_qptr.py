@@ -7,7 +7,7 @@ import pytest
 from tests.contract import problems
 from tests.toy import box, constant, problem
 
-from repair.baselines.corridor import NoCorridor, build_corridor
+from repair.baselines.corridor import NoCorridor, build_corridor, time_grid
 from repair.baselines.qp import braking_problem, infeasibility, require_solver, solve_projection
 from repair.baselines.qptr import QptrBackend, make
 from repair.config import QptrConfig, load_config
@@ -38,8 +38,8 @@ def stop_before(s, **keys):
     return guided([box((s, s + 10), (-1, 1))], -8.0, lateral=False, **keys)
 
 
-def edges(problem_, pieces=8):
-    return np.linspace(problem_.t_rep, problem_.t_end, pieces + 1)
+def corridor_of(task, pieces=8):
+    return build_corridor(task, time_grid(task, pieces))
 
 
 # -- corridor --------------------------------------------------------------------------------------
@@ -47,11 +47,11 @@ def edges(problem_, pieces=8):
 
 def test_corridor_ends_before_the_box_and_holds_the_guide():
     task = stop_before(20.0)
-    corridor = build_corridor(task, edges(task))
-    assert corridor.s_upper.max() <= 20.0 - task.margin + 1e-9
+    corridor = corridor_of(task)
+    assert corridor.s[1].max() <= 20.0 - task.margin + 1e-9
     low, high = corridor.control_bounds(5)
     times = np.concatenate(
-        [np.linspace(a, b, 6) for a, b in zip(edges(task)[:-1], edges(task)[1:], strict=True)]
+        [np.linspace(a, b, 6) for a, b in zip(corridor.edges[:-1], corridor.edges[1:], strict=True)]
     )
     guide = np.interp(times, task.passing.guide.t, task.passing.guide.position[:, 0])
     assert np.all(guide >= low[..., 0].ravel() - 1e-6)
@@ -60,42 +60,42 @@ def test_corridor_ends_before_the_box_and_holds_the_guide():
 
 def test_every_trapezoid_is_below_the_free_space():
     moving = guided([box((18, 24), (-1, 1), v=(3.0, 0.0), present=(0.7, 3.2))], -3.0, lateral=False)
-    corridor = build_corridor(moving, edges(moving))
+    corridor = corridor_of(moving)
     lower, _ = moving.occupancy.at(moving.occupancy.t)
     for i in range(8):
         for t, bound in zip(moving.occupancy.t, lower[0, :, 0], strict=True):
             if corridor.edges[i] <= t <= corridor.edges[i + 1] and np.isfinite(bound):
                 weight = (t - corridor.edges[i]) / 0.5
-                line = (1 - weight) * corridor.s_upper[i, 0] + weight * corridor.s_upper[i, 1]
+                line = (1 - weight) * corridor.s[1, i, 0] + weight * corridor.s[1, i, 1]
                 assert line <= bound - moving.margin + 1e-5
 
 
 def test_box_beside_the_path_does_not_matter():
     task = guided([box((5, 50), (2, 4))], 0.0, lateral=False)
-    corridor = build_corridor(task, edges(task))
-    assert corridor.s_upper.min() > 50.0
+    corridor = corridor_of(task)
+    assert corridor.s[1].min() > 50.0
 
 
 def test_passing_on_the_left_closes_the_right():
     task = guided([box((25, 35), (-2, 2))], 0.0, shift=3.0)
-    corridor = build_corridor(task, edges(task))
+    corridor = corridor_of(task)
     beside = (corridor.edges[:-1] >= 2.5) & (corridor.edges[1:] <= 3.5)
-    assert np.all(corridor.l_lower[beside] >= 2.0 + task.margin - 1e-9)
+    assert np.all(corridor.l[0, beside] >= 2.0 + task.margin - 1e-9)
 
 
 def test_no_corridor_where_full_braking_comes_too_far():
     # -8 m/s² takes 6.25 m to the stop, and 0.1 m are kept from the box.
     close = stop_before(6.4)
-    build_corridor(close, edges(close))
+    corridor_of(close)
     closer = stop_before(6.3)
     with pytest.raises(NoCorridor):
-        build_corridor(closer, edges(closer))
+        corridor_of(closer)
 
 
 def test_no_corridor_where_the_start_is_inside():
     task = guided([box((-1, 5), (-1, 1))], -4.0, lateral=False)
     with pytest.raises(NoCorridor):
-        build_corridor(task, edges(task))
+        corridor_of(task)
 
 
 # -- backend ---------------------------------------------------------------------------------------
@@ -191,10 +191,10 @@ def test_unknown_solver_names_those_there_are():
 def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
     from repair.baselines import qp
 
-    class Broken:
-        found, x, z, extras = True, np.zeros(18), np.zeros(1000), {}
+    def broken(rows, *_):
+        return qp._Raw(np.zeros(rows.shape[1]), np.zeros(len(rows)), "solved")
 
-    monkeypatch.setattr(qp, "_call", lambda *_: Broken())
+    monkeypatch.setattr(qp, "_call", broken)
     qp._objection.cache_clear()
     with pytest.raises(BackendError, match=r"'daqp' is refused: .*braking problem"):
         require_solver("daqp")
@@ -204,20 +204,17 @@ def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
 def test_answer_is_judged_by_its_residuals_not_by_its_name(monkeypatch):
     from repair.baselines import qp
 
-    origin, rows, limit = braking_problem(14.75)
-
-    class Claims:
-        found, x, z, extras = True, np.full(18, 1e3), np.zeros(len(rows)), {}
-
-    monkeypatch.setattr(qp, "_call", lambda *_: Claims())
-    answer = solve_projection(origin, rows, limit, "daqp")
+    rows, lower, upper = braking_problem(14.75)
+    claim = qp._Raw(np.full(18, 1e3), np.zeros(len(rows)), "solved")
+    monkeypatch.setattr(qp, "_call", lambda *_: claim)
+    answer = solve_projection(rows, lower, upper, "daqp")
     assert answer.z is None
     assert answer.status is SolveStatus.NUMERICAL_ERROR
 
 
 def test_shortest_stop_of_the_braking_problem():
-    assert infeasibility(*braking_problem(13.80)[1:]) == pytest.approx(0.0, abs=1e-9)
-    assert infeasibility(*braking_problem(13.70)[1:]) > 1e-3
+    assert infeasibility(*braking_problem(13.80)) == pytest.approx(0.0, abs=1e-9)
+    assert infeasibility(*braking_problem(13.70)) > 1e-3
 
 
 def test_configuration():

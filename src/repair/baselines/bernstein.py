@@ -64,19 +64,34 @@ class BernsteinCurve:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        tau = np.clip(times - self.t_start, 0.0, self.t_end - self.t_start)
-        piece = np.clip(np.floor(tau / self.duration + 1e-9), 0, len(self.points) - 1).astype(np.intp)
-        u = np.clip(tau / self.duration - piece, 0.0, 1.0)
-        columns = [
-            np.einsum("kn,knd->kd", bernstein_basis(u, self.degree - k), self.derivative_points(k)[piece])
-            for k in range(4)
-        ]
-        beyond = times - self.t_start - tau
+        since = times - self.t_start
+        tau = np.clip(since, 0.0, self.t_end - self.t_start)
+        pieces, width, _ = self.points.shape
+        # Probes ask for the same offsets over and over; the matrices are worth keeping.
+        matrix = _sampling(np.round(tau, 12).tobytes(), pieces, width - 1, self.duration)
+        stacked = (matrix @ self.points.reshape(pieces * width, 2)).reshape(4, len(times), 2)
+        position, velocity, acceleration, jerk = stacked
+        beyond = since - tau
         out = np.abs(beyond) > 1e-9
-        columns[0][out] += beyond[out, None] * columns[1][out]
-        columns[2][out] = 0.0
-        columns[3][out] = 0.0
-        return FrenetTrajectory(times, *columns)
+        if out.any():
+            position[out] += beyond[out, None] * velocity[out]
+            acceleration[out] = 0.0
+            jerk[out] = 0.0
+        return FrenetTrajectory(times, position, velocity, acceleration, jerk)
+
+
+@lru_cache(maxsize=256)
+def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
+    """Values (4 K, N) of position to jerk at the ``offsets`` since the start."""
+    tau = np.frombuffer(offsets) / duration
+    piece = np.clip(np.floor(tau + 1e-9), 0, pieces - 1).astype(np.intp)
+    u = np.clip(tau - piece, 0.0, 1.0)
+    rows = np.zeros((4, len(tau), pieces, degree + 1))
+    for order in range(4):
+        rows[order, np.arange(len(tau)), piece] = bernstein_basis(u, degree - order) @ _derivative(
+            1, degree, duration, order
+        )
+    return frozen(rows.reshape(4 * len(tau), -1))
 
 
 @dataclass(frozen=True)
@@ -106,12 +121,16 @@ class QpStructure:
         Times of the quadrature since the start [s].
     at_nodes : (K, N) array
         Values of the curve at the nodes.
+    jerk_at_nodes : (K, N) array
+        Jerk of the curve at the nodes.
     weights : (K,) array
         Quadrature weights [s]; exact for the square of a piece.
     hessian : (N, N) array
         Of the objective over x.
-    joints : (J, N) array
+    jumps : (J, N) array
         Jump of position and derivatives at the joints.
+    follow : (N, 3 + K) array
+        Control points with a start state and the least squares fit to values at the nodes.
     """
 
     pieces: int
@@ -125,9 +144,11 @@ class QpStructure:
     reach: tuple[Array, ...]
     nodes: Array
     at_nodes: Array
+    jerk_at_nodes: Array
     weights: Array
     hessian: Array
-    joints: Array
+    jumps: Array
+    follow: Array
 
 
 def _derivative(pieces: int, degree: int, duration: float, order: int) -> Array:
@@ -182,6 +203,10 @@ def qp_structure(
     )
     factor = np.linalg.cholesky(null.T @ hessian @ null)
     basis = np.linalg.solve(factor, null.T).T
+    fit = basis @ np.linalg.pinv(at_nodes @ basis)
+    follow = np.hstack([lift - fit @ (at_nodes @ lift), fit])
+    scale = [factorial(degree) / factorial(degree - k) / duration**k for k in range(continuity + 1)]
+    jumps = np.repeat(scale, pieces - 1)[:, None] * joints
     piece = np.arange(pieces)[:, None]
     return QpStructure(
         pieces,
@@ -195,7 +220,9 @@ def qp_structure(
         tuple(frozen(d @ basis) for d in derivatives),
         frozen((duration * (piece + u)).ravel()),
         frozen(at_nodes),
+        frozen(jerk),
         frozen(weights),
         frozen(hessian),
-        frozen(joints),
+        frozen(jumps),
+        frozen(follow),
     )
