@@ -22,7 +22,8 @@ from repair.types import Array, RepairProblem, Side, frozen
 __all__ = ["Corridor", "NoCorridor", "TimeGrid", "build_corridor", "time_grid"]
 
 _TOLERANCE = 1e-6
-_ALONG = 2.0  # the lateral room counts this far before and behind the guide [m]
+_AROUND = np.array([-2.0, 0.0, 2.0])[:, None, None]  # the lateral room counts here along the guide [m]
+_MIRROR = np.array([-1.0, 1.0])[:, None, None]
 _SAME = 1e-9  # times [s] and bounds [m] closer than this are one
 
 
@@ -53,6 +54,11 @@ class TimeGrid:
         Time since that of ``base`` [s].
     line : (M, C) bool array
         Two different times make the line.
+    step, after : (M L,) int array
+        Steps of the occupancy before and after each time, the same where the time is a step.
+    share : (M L, 1) array or None
+        How far each time is on the way from one to the other, NaN outside of the occupancy; None where
+        all times are steps.
     """
 
     edges: Array
@@ -63,6 +69,16 @@ class TimeGrid:
     span: Array
     run: Array
     line: npt.NDArray[np.bool_]
+    step: npt.NDArray[np.intp]
+    after: npt.NDArray[np.intp]
+    share: Array | None
+
+    def at(self, corners: Array) -> Array:
+        """Boxes' corners (N, M, L, 2) from those at the steps (N, T, 2), as ``Occupancy.at`` has them."""
+        values = corners.take(self.step, axis=1)
+        if self.share is not None:
+            values += self.share * (corners.take(self.after, axis=1) - values)
+        return values.reshape(len(values), *self.t.shape, 2)
 
 
 @lru_cache(maxsize=128)
@@ -80,7 +96,19 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     line = np.concatenate([span > 0.0, np.ones_like(t, dtype=np.bool_)], axis=1)
     span[span <= 0.0] = 1.0
     run = t.T[:, :, None] - t[:, base]
-    return TimeGrid(edges, frozen(t), frozen(t.ravel()), base, j, span, run, line)
+    return TimeGrid(edges, frozen(t), frozen(t.ravel()), base, j, span, run, line, *_steps(t.ravel(), steps))
+
+
+def _steps(times: Array, steps: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array | None]:
+    """Steps before and after each time, and how far it is on the way between them."""
+    where = (times - steps[0]) / (steps[1] - steps[0] if len(steps) > 1 else 1.0)
+    nearest, last = np.rint(where), len(steps) - 1
+    where = np.where(np.abs(where - nearest) < 1e-6, nearest, where)
+    before = np.clip(np.floor(where), 0, last).astype(np.intp)
+    # On a step its own row counts alone: the next one may be NaN.
+    after = np.where(where > before, np.minimum(before + 1, last), before)
+    share = np.where((where < 0) | (where > last), np.nan, where - before)
+    return before, after, share[:, None] if (share != 0.0).any() else None
 
 
 def time_grid(problem: RepairProblem, pieces: int) -> TimeGrid:
@@ -138,31 +166,26 @@ def build_corridor(problem: RepairProblem, grid: TimeGrid, reference: Array | No
     """
     if reference is None:
         reference = problem.reference.sample(grid.flat).position
-    s, l = _guide(problem, grid, reference)  # noqa: E741
-    above, below, sideways = _walls(problem, grid, s, l)
+    guide = _guide(problem, grid, reference)
+    along, sideways = _walls(problem, grid, *guide)
     # A lower bound is the upper bound of what is mirrored.
-    guide = s.reshape(grid.t.shape)
-    ends = _lines_below(grid, np.concatenate([above, -below]), np.concatenate([guide, -guide]))
-    pieces = len(grid.t)
-    along = np.empty((2, pieces, 2))
-    np.negative(ends[pieces:], out=along[0])
-    along[1] = ends[:pieces]
+    ends = _lines_below(grid, _MIRROR * along, _MIRROR * guide[0])
     if problem.lateral:
-        _cut_to_road(problem, s, sideways)
-    corridor = Corridor(grid.edges, along, sideways)
+        _cut_to_road(problem, guide[0], sideways)
+    corridor = Corridor(grid.edges, _MIRROR * ends, sideways)
     _require_open(problem, corridor)
     return corridor
 
 
 def _guide(problem: RepairProblem, grid: TimeGrid, reference: Array) -> tuple[Array, Array]:
-    """Of the guide, s and l (M L,); without lateral freedom its l is that of the reference."""
-    if problem.passing is None:
-        return reference[:, 0], reference[:, 1]
-    path = problem.passing.guide
-    s = np.interp(grid.flat, path.t, path.position[:, 0])
-    if not problem.lateral:
-        return s, reference[:, 1]
-    return s, np.interp(grid.flat, path.t, path.position[:, 1])
+    """Of the guide, s and l (M, L); without lateral freedom its l is that of the reference."""
+    s, l = reference[:, 0], reference[:, 1]  # noqa: E741
+    if problem.passing is not None:
+        path = problem.passing.guide
+        s = np.interp(grid.flat, path.t, path.position[:, 0])
+        if problem.lateral:
+            l = np.interp(grid.flat, path.t, path.position[:, 1])  # noqa: E741
+    return s.reshape(grid.t.shape), l.reshape(grid.t.shape)
 
 
 def _walls(
@@ -170,89 +193,88 @@ def _walls(
     grid: TimeGrid,
     s: Array,
     l: Array,  # noqa: E741
-) -> tuple[Array, Array, Array]:
-    """What the obstacles leave: largest and smallest s (M, L), smallest and largest l (2, M).
+) -> tuple[Array, Array]:
+    """What the obstacles leave: smallest and largest s (2, M, L), smallest and largest l (2, M).
 
     Over a piece an obstacle is kept on that side which the guide keeps all the time; where the guide
     changes sides within the piece, each time has its own.
     """
-    shape = grid.t.shape
-    farthest = problem.start[0, 0] + problem.limits.v_max * (problem.t_end - problem.t_rep) + 1.0
-    nearest = problem.start[0, 0] - 1.0
-    sideways = np.empty((2, shape[0]))
-    sideways[0], sideways[1] = -np.inf, np.inf
-    count = len(problem.occupancy)
-    if not count:
-        return np.full(shape, farthest), np.full(shape, nearest), sideways
-    lower, upper = problem.occupancy.at(grid.flat)
-    lower, upper = lower - problem.margin, upper + problem.margin
-    # In the order of Side. Where l is given, a box can only be passed along s.
-    room = np.empty((4 if problem.lateral else 2, count, s.size))
+    start, farthest = problem.start[0, 0], problem.limits.v_max * (problem.t_end - problem.t_rep) + 1.0
+    along, sideways = np.empty((2, *s.shape)), np.empty((2, len(s)))
+    along[0], along[1], sideways[0], sideways[1] = start - 1.0, start + farthest, -np.inf, np.inf
+    lower, upper = grid.at(problem.occupancy.lower), grid.at(problem.occupancy.upper)
+    lower -= problem.margin
+    upper += problem.margin
+    # Where l is given, a box beside the path is no matter; nor is one that is not there (NaN) anywhere.
+    across = (lower[..., 1] < l) & (l < upper[..., 1])
+    present = np.isfinite(lower).all(axis=3) if problem.lateral else across
+    if not present.any():
+        return along, sideways
+    # In the order of Side; where l is given, a box can only be passed along s.
+    room = np.empty((4 if problem.lateral else 2, *present.shape))
     np.subtract(lower[..., 0], s, out=room[Side.BEHIND])
     np.subtract(s, upper[..., 0], out=room[Side.AHEAD])
     if problem.lateral:
         np.subtract(l, upper[..., 1], out=room[Side.LEFT])
         np.subtract(lower[..., 1], l, out=room[Side.RIGHT])
-        present = np.isfinite(room).all(axis=0)
-    else:
-        # A box beside the path is no matter; nor is one that is not there (NaN).
-        present = (l < upper[..., 1]) & (lower[..., 1] < l)
-    if not present.any():
-        return np.full(shape, farthest), np.full(shape, nearest), sideways
     np.copyto(room, np.inf, where=~present)
-    side = _sides(room.reshape(len(room), count, *shape)).reshape(present.shape)
-
-    def tightest(chosen: Side, corner: Array, pick: np.ufunc, otherwise: float) -> Array:
-        return np.asarray(pick.reduce(np.where(present & (side == chosen), corner, otherwise)).reshape(shape))
-
-    above = tightest(Side.BEHIND, lower[..., 0], np.minimum, farthest)
-    below = tightest(Side.AHEAD, upper[..., 0], np.maximum, nearest)
+    side = _sides(room)
+    behind, ahead = present & (side == Side.BEHIND), present & (side == Side.AHEAD)
+    np.maximum.reduce(upper[..., 0], where=ahead, initial=start - 1.0, out=along[0])
+    np.minimum.reduce(lower[..., 0], where=behind, initial=start + farthest, out=along[1])
     if problem.lateral:
-        tightest(Side.LEFT, upper[..., 1], np.maximum, -np.inf).max(axis=1, out=sideways[0])
-        tightest(Side.RIGHT, lower[..., 1], np.minimum, np.inf).min(axis=1, out=sideways[1])
-    return above, below, sideways
+        left, right = present & (side == Side.LEFT), present & (side == Side.RIGHT)
+        np.maximum.reduce(upper[..., 1], axis=(0, 2), where=left, initial=-np.inf, out=sideways[0])
+        np.minimum.reduce(lower[..., 1], axis=(0, 2), where=right, initial=np.inf, out=sideways[1])
+    return along, sideways
 
 
-def _sides(room: Array) -> Array:
-    """Side (N, M, L) of each obstacle, from the room (sides, N, M, L) on each; inf where it is not there."""
-    least = room.min(axis=3)
-    kept = np.broadcast_to(least.argmax(axis=0)[..., None], room.shape[1:])
-    steady = least.max(axis=0) >= -_TOLERANCE
+def _sides(room: Array) -> npt.NDArray[np.intp]:
+    """Side of each obstacle, (N, M, L) or (N, M, 1), from the room (sides, N, M, L) on each.
+
+    The room is inf where the obstacle is not there.
+    """
+    least = np.minimum.reduce(room, axis=3)
+    kept = least.argmax(axis=0)[..., None]
+    steady = np.maximum.reduce(least) >= -_TOLERANCE
     return kept if steady.all() else np.where(steady[..., None], kept, room.argmax(axis=0))
 
 
 def _lines_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
-    """End values (2 M, 2) of the line below each of ``values`` (2 M, L) that leaves the guide the most room.
+    """End values (2, M, 2) of the line below each of ``values`` (2, M, L), leaving ``guide`` the most room.
 
     Candidates are the lines through two of the points, and the lines through one of them with the
     guide's mean slope; the best is that of largest smallest distance to the guide. What is constant
     is its own line.
     """
-    ends = values[:, :: values.shape[1] - 1].copy()
-    bent = np.flatnonzero(values.max(axis=1) - values.min(axis=1) >= _SAME)
-    if not len(bent):
-        return ends
-    piece = bent % len(grid.t)
-    v, g, t = values[bent], guide[bent], grid.t[piece]
-    pairs = len(grid.second)
-    through = v[:, grid.base]
-    slope = np.empty(through.shape)
-    np.divide(v[:, grid.second] - through[:, :pairs], grid.span[piece], out=slope[:, :pairs])
-    slope[:, pairs:] = ((g[:, -1] - g[:, 0]) / (t[:, -1] - t[:, 0]))[:, None]
-    lines = through + slope * grid.run[:, piece]
-    below = (lines <= v.T[:, :, None] + _TOLERANCE).all(axis=0) & grid.line[piece]
-    gap = np.where(below, (lines - g.T[:, :, None]).min(axis=0), -np.inf)
-    each = np.arange(len(bent))
-    ends[bent] = lines[:: len(lines) - 1, each, gap.argmax(axis=1)].T
-    return ends
+    count = values.shape[2]
+    values, guide = values.reshape(-1, count), guide.reshape(-1, count)
+    ends = values[:, :: count - 1].copy()
+    bent = np.flatnonzero(np.ptp(values, axis=1) >= _SAME)
+    if len(bent):
+        piece, pairs, times = bent % len(grid.t), len(grid.second), grid.t
+        v, g, t = values.take(bent, axis=0), guide.take(bent, axis=0), times.take(piece, axis=0)
+        through = v.take(grid.base, axis=1)
+        slope = np.empty(through.shape)
+        rise = v.take(grid.second, axis=1) - through[:, :pairs]
+        np.divide(rise, grid.span.take(piece, axis=0), out=slope[:, :pairs])
+        slope[:, pairs:] = ((g[:, -1] - g[:, 0]) / (t[:, -1] - t[:, 0]))[:, None]
+        lines = grid.run.take(piece, axis=1)
+        lines *= slope
+        lines += through
+        below = np.logical_and.reduce(lines <= v.T[:, :, None] + _TOLERANCE)
+        below &= grid.line.take(piece, axis=0)
+        gap = np.minimum.reduce(lines - g.T[:, :, None])
+        best = np.where(below, gap, -np.inf).argmax(axis=1)
+        ends[bent] = lines[:: count - 1, np.arange(len(bent)), best].T
+    return ends.reshape(2, -1, 2)
 
 
 def _cut_to_road(problem: RepairProblem, s: Array, sideways: Array) -> None:
     """Cut the l intervals to the lateral room around the guide; the start always counts as inside."""
     start = float(problem.start[0, 1])
-    right, left = problem.bounds.at(s + np.array([[-_ALONG], [0.0], [_ALONG]]))
-    by_piece = (3, sideways.shape[1], -1)
-    narrow, wide = right.reshape(by_piece).max(axis=(0, 2)), left.reshape(by_piece).min(axis=(0, 2))
+    right, left = problem.bounds.at(s + _AROUND)
+    narrow, wide = right.max(axis=(0, 2)), left.min(axis=(0, 2))
     narrow[0], wide[0] = min(narrow[0], start), max(wide[0], start)
     np.maximum(sideways[0], narrow, out=sideways[0])
     np.minimum(sideways[1], wide, out=sideways[1])
@@ -271,7 +293,7 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
     if problem.lateral and not right[0] - _TOLERANCE <= start[1] <= left[0] + _TOLERANCE:
         raise NoCorridor("the start lies beside the first piece of the corridor")
     least = _least_progress(problem, edges)
-    if (np.maximum(low, least) <= high).all() and (not problem.lateral or (right <= left).all()):
+    if (np.maximum(low, least) <= high).all() and (right <= left).all():
         return
     for lower, upper, where in ((low, high, "along the path"), (right, left, "sideways")):
         if (lower > upper + _TOLERANCE).any():
