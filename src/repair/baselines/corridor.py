@@ -235,7 +235,7 @@ def _sides(room: Array) -> npt.NDArray[np.intp]:
     The room is inf where the obstacle is not there.
     """
     least = np.minimum.reduce(room, axis=3)
-    kept = least.argmax(axis=0)[..., None]
+    kept: npt.NDArray[np.intp] = least.argmax(axis=0)[..., None]
     steady = np.maximum.reduce(least) >= -_TOLERANCE
     return kept if steady.all() else np.where(steady[..., None], kept, room.argmax(axis=0))
 

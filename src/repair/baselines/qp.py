@@ -38,8 +38,6 @@ _SOFT = 1e-8
 # Tolerances well below what the checker can see; the defaults of the first-order methods are not.
 _SETTINGS: dict[str, dict[str, Any]] = {
     "osqp": {
-        "eps_abs": 1e-6,
-        "eps_rel": 1e-8,
         "eps_prim_inf": 1e-7,
         "max_iter": 50_000,
         "polishing": True,
@@ -49,6 +47,9 @@ _SETTINGS: dict[str, dict[str, Any]] = {
     "clarabel": {"tol_feas": 1e-9, "tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9},
     "daqp": {"primal_tol": 1e-8, "dual_tol": 1e-10},
 }
+_OSQP_TOLERANCES = tuple({"eps_abs": e, "eps_rel": 0.01 * e} for e in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6))
+#: Violation and relative gap of an answer that further iterations cannot better.
+_EXACT = 1e-8
 _TIMED = ("osqp", "clarabel", "daqp")
 _SPARSE = ("clarabel", "qpalm", "highs", "piqp", "ecos", "scs", "hpipm")
 _DAQP_WORDS = {
@@ -111,8 +112,7 @@ def solve_projection(
         )
     violation = np.inf
     if raw.z is not None:
-        value = rows @ raw.z
-        violation = max(float((value - upper).max()), float((lower - value).max()), 0.0)
+        violation = _violation(rows, lower, upper, raw.z)
         # NaN fails both comparisons.
         if violation <= FEASIBLE and _gap(rows, lower, upper, raw) <= OPTIMAL:
             return QpAnswer(SolveStatus.SOLVED, raw.z, violation, f"{solver}: {raw.word}")
@@ -128,12 +128,13 @@ def solve_projection(
             least,
             f"{solver}: {raw.word}; the constraints have no common point",
         )
-    detail = f"{solver}: {raw.word}, although the constraints have a common point"
+    # OSQP calls what it has at its iteration limit inaccurate.
+    limited = "max" in raw.word or "inaccurate" in raw.word
     return QpAnswer(
-        SolveStatus.ITERATION_LIMIT if "max" in raw.word else SolveStatus.NUMERICAL_ERROR,
+        SolveStatus.ITERATION_LIMIT if limited else SolveStatus.NUMERICAL_ERROR,
         None,
         violation,
-        detail,
+        f"{solver}: {raw.word}, although the constraints have a common point",
     )
 
 
@@ -164,13 +165,33 @@ def _daqp(rows: Array, lower: Array, upper: Array, settings: dict[str, Any]) -> 
 
 
 def _osqp(rows: Array, lower: Array, upper: Array, settings: dict[str, Any]) -> _Raw:
+    """OSQP, with tolerances that tighten until its polishing has the right constraints active.
+
+    From then on the answer is exact and further iterations gain nothing; that is often long before
+    the iterates themselves are close. A new solver each time: the answer depends on nothing else.
+    """
     import osqp
     from scipy.sparse import csc_matrix, eye
 
+    begin = time.perf_counter()
     m = rows.shape[1]
     solver = osqp.OSQP()
-    solver.setup(eye(m, format="csc"), np.zeros(m), csc_matrix(rows), lower, upper, **settings)
+    first, *others = _OSQP_TOLERANCES
+    solver.setup(eye(m, format="csc"), np.zeros(m), csc_matrix(rows), lower, upper, **{**settings, **first})
     answer = solver.solve(raise_error=False)
+    for tighter in others:
+        word = str(answer.info.status).lower()
+        raw = _Raw(answer.x, answer.y, word)
+        if word != "solved" or (
+            _violation(rows, lower, upper, answer.x) <= _EXACT and _gap(rows, lower, upper, raw) <= _EXACT
+        ):
+            return raw
+        if "time_limit" in settings:
+            tighter = {**tighter, "time_limit": settings["time_limit"] - (time.perf_counter() - begin)}
+            if tighter["time_limit"] <= 0.0:
+                return raw
+        solver.update_settings(**tighter)
+        answer = solver.solve(raise_error=False)
     return _Raw(answer.x, answer.y, str(answer.info.status).lower())
 
 
@@ -208,6 +229,12 @@ def _word(solution: Any) -> str:
         or ("solved" if solution.found else "no solution")
     )
     return str(word).lower()
+
+
+def _violation(rows: Array, lower: Array, upper: Array, z: Array) -> float:
+    """Largest violation of a bound; NaN stays NaN."""
+    value = rows @ z
+    return max(float(np.maximum.reduce(value - upper)), float(np.maximum.reduce(lower - value)), 0.0)
 
 
 def _combined(rows: Array, lower: Array, upper: Array, y: Array) -> tuple[Array, float]:
