@@ -170,6 +170,60 @@ def _joints(pieces: int, degree: int, continuity: int) -> Array:
     return rows
 
 
+@dataclass(frozen=True)
+class _Unit:
+    """What of a :class:`QpStructure` the duration of a piece only scales: all of it for pieces of 1 s.
+
+    ``null`` (N, m) spans the directions that keep start, joints and end; ``jerk_form`` and
+    ``deviation_form`` are the quadratic forms of the objective's terms over x.
+    """
+
+    lift: Array
+    null: Array
+    derivatives: tuple[Array, ...]
+    nodes: Array
+    at_nodes: Array
+    jerk_at_nodes: Array
+    weights: Array
+    jerk_form: Array
+    deviation_form: Array
+    jumps: Array
+    follow: Array
+
+
+@lru_cache(maxsize=64)
+def _unit(pieces: int, degree: int, continuity: int, settles: bool) -> _Unit:
+    width = degree + 1
+    derivatives = tuple(_derivative(pieces, degree, 1.0, k) for k in range(4))
+    start = np.vstack([derivatives[k][:1] for k in range(3)])
+    joints = _joints(pieces, degree, continuity)
+    end = np.vstack([derivatives[k][-1:] for k in (1, 2)]) if settles else np.empty((0, pieces * width))
+    fixed = np.vstack([start, joints, end])
+    lift = np.linalg.pinv(fixed)[:, :3]
+    null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
+
+    nodes, node_weights = np.polynomial.legendre.leggauss(width)
+    u = 0.5 * (nodes + 1.0)
+    weights = np.tile(0.5 * node_weights, pieces)
+    at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
+    jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
+    fit = null @ np.linalg.pinv(at_nodes @ null)
+    orders = [factorial(degree) / factorial(degree - k) for k in range(continuity + 1)]
+    return _Unit(
+        lift,
+        null,
+        derivatives,
+        (np.arange(pieces)[:, None] + u).ravel(),
+        at_nodes,
+        jerk,
+        weights,
+        jerk.T @ (weights[:, None] * jerk),
+        at_nodes.T @ (weights[:, None] * at_nodes),
+        np.repeat(orders, pieces - 1)[:, None] * joints,
+        np.hstack([lift - fit @ (at_nodes @ lift), fit]),
+    )
+
+
 @lru_cache(maxsize=64)
 def qp_structure(
     pieces: int,
@@ -184,45 +238,30 @@ def qp_structure(
 
     With ``settles`` the speed and the acceleration at the end are zero.
     """
-    width = degree + 1
-    derivatives = tuple(_derivative(pieces, degree, duration, k) for k in range(4))
-    start = np.vstack([derivatives[k][:1] for k in range(3)])
-    joints = _joints(pieces, degree, continuity)
-    end = np.vstack([derivatives[k][-1:] for k in (1, 2)]) if settles else np.empty((0, pieces * width))
-    fixed = np.vstack([start, joints, end])
-    lift = np.linalg.pinv(fixed)[:, :3]
-    null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
-
-    nodes, node_weights = np.polynomial.legendre.leggauss(width)
-    u = 0.5 * (nodes + 1.0)
-    weights = np.tile(0.5 * duration * node_weights, pieces)
-    at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
-    jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
-    hessian = 2.0 * (
-        w_jerk * jerk.T @ (weights[:, None] * jerk) + w_deviation * at_nodes.T @ (weights[:, None] * at_nodes)
-    )
-    factor = np.linalg.cholesky(null.T @ hessian @ null)
-    basis = np.linalg.solve(factor, null.T).T
-    fit = basis @ np.linalg.pinv(at_nodes @ basis)
-    follow = np.hstack([lift - fit @ (at_nodes @ lift), fit])
-    scale = [factorial(degree) / factorial(degree - k) / duration**k for k in range(continuity + 1)]
-    jumps = np.repeat(scale, pieces - 1)[:, None] * joints
-    piece = np.arange(pieces)[:, None]
+    h, unit = duration, _unit(pieces, degree, continuity, settles)
+    state = np.array([1.0, h, h**2])  # a speed of 1 is one of h per unit of time
+    hessian = 2.0 * (w_jerk / h**5 * unit.jerk_form + w_deviation * h * unit.deviation_form)
+    factor = np.linalg.cholesky(unit.null.T @ hessian @ unit.null)
+    basis = np.linalg.solve(factor, unit.null.T).T
+    derivatives = tuple(d / h**k for k, d in enumerate(unit.derivatives))
+    follow = unit.follow.copy()
+    follow[:, :3] *= state
+    times = np.arange(pieces)[:, None] + np.arange(degree + 1) / degree
     return QpStructure(
         pieces,
         degree,
         continuity,
         duration,
-        frozen((duration * (piece + np.arange(width) / degree)).ravel()),
-        frozen(lift),
+        frozen(h * times.ravel()),
+        frozen(unit.lift * state),
         frozen(basis),
         tuple(frozen(d) for d in derivatives),
         tuple(frozen(d @ basis) for d in derivatives),
-        frozen((duration * (piece + u)).ravel()),
-        frozen(at_nodes),
-        frozen(jerk),
-        frozen(weights),
+        frozen(h * unit.nodes),
+        frozen(unit.at_nodes),
+        frozen(unit.jerk_at_nodes / h**3),
+        frozen(h * unit.weights),
         frozen(hessian),
-        frozen(jumps),
+        frozen(unit.jumps / h ** np.repeat(np.arange(continuity + 1), pieces - 1)[:, None]),
         frozen(follow),
     )

@@ -81,6 +81,12 @@ class TimeGrid:
         return values.reshape(len(values), *self.t.shape, 2)
 
 
+@lru_cache(maxsize=32)
+def _candidates(count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    first, second = np.triu_indices(count, k=1)
+    return np.concatenate([first, np.arange(count)]), second
+
+
 @lru_cache(maxsize=128)
 def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> TimeGrid:
     edges = np.asarray(t_start + (t_end - t_start) / pieces * np.arange(pieces + 1))
@@ -90,13 +96,14 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     first = np.searchsorted(times, edges[:-1] - _SAME)
     last = np.searchsorted(times, edges[1:] + _SAME, side="right") - 1
     t = times[np.minimum(first[:, None] + np.arange((last - first).max() + 1), last[:, None])]
-    i, j = np.triu_indices(t.shape[1], k=1)
-    base = np.concatenate([i, np.arange(t.shape[1])])
-    span = t[:, j] - t[:, i]
+    base, second = _candidates(t.shape[1])
+    span = t[:, second] - t[:, base[: len(second)]]
     line = np.concatenate([span > 0.0, np.ones_like(t, dtype=np.bool_)], axis=1)
     span[span <= 0.0] = 1.0
     run = t.T[:, :, None] - t[:, base]
-    return TimeGrid(edges, frozen(t), frozen(t.ravel()), base, j, span, run, line, *_steps(t.ravel(), steps))
+    return TimeGrid(
+        edges, frozen(t), frozen(t.ravel()), base, second, span, run, line, *_steps(t.ravel(), steps)
+    )
 
 
 def _steps(times: Array, steps: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array | None]:
