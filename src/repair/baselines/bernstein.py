@@ -219,7 +219,7 @@ def _unit(pieces: int, degree: int, continuity: int, settles: bool) -> _Unit:
         weights,
         jerk.T @ (weights[:, None] * jerk),
         at_nodes.T @ (weights[:, None] * at_nodes),
-        np.repeat(orders, pieces - 1)[:, None] * joints,
+        np.tile(orders, pieces - 1)[:, None] * joints,
         np.hstack([lift - fit @ (at_nodes @ lift), fit]),
     )
 
@@ -262,6 +262,6 @@ def qp_structure(
         frozen(unit.jerk_at_nodes / h**3),
         frozen(h * unit.weights),
         frozen(hessian),
-        frozen(unit.jumps / h ** np.repeat(np.arange(continuity + 1), pieces - 1)[:, None]),
+        frozen(unit.jumps / h ** np.tile(np.arange(continuity + 1), pieces - 1)[:, None]),
         frozen(follow),
     )
