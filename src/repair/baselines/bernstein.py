@@ -65,7 +65,7 @@ class BernsteinCurve:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         since = times - self.t_start
-        tau = np.clip(since, 0.0, self.t_end - self.t_start)
+        tau = np.minimum(np.maximum(since, 0.0), self.t_end - self.t_start)
         pieces, width, _ = self.points.shape
         # Probes ask for the same offsets over and over; the matrices are worth keeping.
         matrix = _sampling(np.round(tau, 12).tobytes(), pieces, width - 1, self.duration)

@@ -257,7 +257,7 @@ def _lines_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
     count = values.shape[2]
     values, guide = values.reshape(-1, count), guide.reshape(-1, count)
     ends = values[:, :: count - 1].copy()
-    bent = np.flatnonzero(np.ptp(values, axis=1) >= _SAME)
+    bent = np.flatnonzero(np.maximum.reduce(values, axis=1) - np.minimum.reduce(values, axis=1) >= _SAME)
     if len(bent):
         piece, pairs, times = bent % len(grid.t), len(grid.second), grid.t
         v, g, t = values.take(bent, axis=0), guide.take(bent, axis=0), times.take(piece, axis=0)

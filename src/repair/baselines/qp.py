@@ -99,7 +99,7 @@ def solve_projection(
     """
     if time_limit is not None and time_limit <= 0.0:
         return QpAnswer(SolveStatus.TIME_LIMIT, None, np.inf, "no time left")
-    if upper.min(initial=0.0) >= 0.0 >= lower.max(initial=0.0):
+    if np.minimum.reduce(upper, initial=0.0) >= 0.0 >= np.maximum.reduce(lower, initial=0.0):
         return QpAnswer(SolveStatus.SOLVED, np.zeros(rows.shape[1]), 0.0, "no constraint is active")
     begin = time.perf_counter()
     # daqp reads on from the first number, whatever the strides are.
@@ -240,8 +240,9 @@ def _violation(rows: Array, lower: Array, upper: Array, z: Array) -> float:
 def _combined(rows: Array, lower: Array, upper: Array, y: Array) -> tuple[Array, float]:
     """``rows.T @ y`` and the largest value that the bounds allow for ``y @ (rows @ z)``."""
     used = np.flatnonzero(y)
-    y = y[used]
-    return y @ rows[used], float(y @ np.where(y > 0.0, upper[used], lower[used]))
+    y = y.take(used)
+    allowed = np.where(y > 0.0, upper.take(used), lower.take(used))
+    return y @ rows.take(used, axis=0), float(y @ allowed)
 
 
 def _gap(rows: Array, lower: Array, upper: Array, raw: _Raw) -> float:
