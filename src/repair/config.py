@@ -149,7 +149,7 @@ class CasadiConfig:
 class QptrConfig:
     """The Bernstein QP baseline."""
 
-    solver: str = "osqp"  # any QP solver that qpsolvers finds: osqp | daqp | clarabel | ...
+    solver: str = "daqp"  # any QP solver that qpsolvers finds: daqp | osqp | clarabel | ...
     degree: int = 5  # of the Bernstein polynomials
     spacing: float = 0.5  # duration of a piece [s]
     continuity: int = 2  # derivatives that are continuous at the joints

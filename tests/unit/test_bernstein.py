@@ -92,3 +92,24 @@ def test_quadrature_is_exact_for_jerk_and_deviation():
     samples = curve.sample(fine)
     integral = trapezoid(samples.jerk[:, 0] ** 2 + samples.position[:, 0] ** 2, fine)
     assert 0.5 * x @ structure.hessian @ x == pytest.approx(integral, rel=1e-3)
+
+
+def test_follow_reproduces_a_polynomial_with_its_start():
+    structure = qp_structure(3, 5, 0.6, 2, 1.0, 0.1)
+    course = np.polynomial.Polynomial([0.3, -0.2, 0.4, 0.1, -0.05, 0.02])
+    task = np.concatenate([[course.deriv(k)(0.0) for k in range(3)], course(structure.nodes)])
+    x = structure.follow @ task
+    curve = BernsteinCurve(0.0, 0.6, np.stack([x, x], axis=1).reshape(3, 6, 2))
+    t = np.linspace(0.0, 1.8, 25)
+    np.testing.assert_allclose(curve.sample(t).position[:, 0], course(t), atol=1e-9)
+    np.testing.assert_allclose(curve.sample(t).jerk[:, 0], course.deriv(3)(t), atol=1e-6)
+
+
+def test_jumps_are_those_of_the_derivatives():
+    structure = qp_structure(3, 5, 0.6, 2, 1.0, 0.1)
+    x = np.random.default_rng(4).normal(size=len(structure.times))
+    curve = BernsteinCurve(0.0, 0.6, np.stack([x, x], axis=1).reshape(3, 6, 2))
+    found = (structure.jumps @ x).reshape(2, 3).T
+    for order in range(3):
+        points = curve.derivative_points(order)[..., 0]
+        np.testing.assert_allclose(found[order], points[:-1, -1] - points[1:, 0], rtol=1e-9)

@@ -7,8 +7,8 @@ import pytest
 from tests.contract import problems
 from tests.toy import box, constant, problem
 
-from repair.baselines.corridor import NoCorridor, build_corridor
-from repair.baselines.qp import braking_problem, infeasibility, require_solver, solve_projection
+from repair.baselines.corridor import NoCorridor, build_corridor, time_grid
+from repair.baselines.qp import QpAnswer, braking_problem, infeasibility, require_solver, solve_projection
 from repair.baselines.qptr import QptrBackend, make
 from repair.config import QptrConfig, load_config
 from repair.errors import BackendError, ConfigError
@@ -38,8 +38,8 @@ def stop_before(s, **keys):
     return guided([box((s, s + 10), (-1, 1))], -8.0, lateral=False, **keys)
 
 
-def edges(problem_, pieces=8):
-    return np.linspace(problem_.t_rep, problem_.t_end, pieces + 1)
+def corridor_of(task, pieces=8):
+    return build_corridor(task, time_grid(task, pieces))
 
 
 # -- corridor --------------------------------------------------------------------------------------
@@ -47,11 +47,11 @@ def edges(problem_, pieces=8):
 
 def test_corridor_ends_before_the_box_and_holds_the_guide():
     task = stop_before(20.0)
-    corridor = build_corridor(task, edges(task))
-    assert corridor.s_upper.max() <= 20.0 - task.margin + 1e-9
+    corridor = corridor_of(task)
+    assert corridor.s[1].max() <= 20.0 - task.margin + 1e-9
     low, high = corridor.control_bounds(5)
     times = np.concatenate(
-        [np.linspace(a, b, 6) for a, b in zip(edges(task)[:-1], edges(task)[1:], strict=True)]
+        [np.linspace(a, b, 6) for a, b in zip(corridor.edges[:-1], corridor.edges[1:], strict=True)]
     )
     guide = np.interp(times, task.passing.guide.t, task.passing.guide.position[:, 0])
     assert np.all(guide >= low[..., 0].ravel() - 1e-6)
@@ -60,42 +60,60 @@ def test_corridor_ends_before_the_box_and_holds_the_guide():
 
 def test_every_trapezoid_is_below_the_free_space():
     moving = guided([box((18, 24), (-1, 1), v=(3.0, 0.0), present=(0.7, 3.2))], -3.0, lateral=False)
-    corridor = build_corridor(moving, edges(moving))
+    corridor = corridor_of(moving)
     lower, _ = moving.occupancy.at(moving.occupancy.t)
     for i in range(8):
         for t, bound in zip(moving.occupancy.t, lower[0, :, 0], strict=True):
             if corridor.edges[i] <= t <= corridor.edges[i + 1] and np.isfinite(bound):
                 weight = (t - corridor.edges[i]) / 0.5
-                line = (1 - weight) * corridor.s_upper[i, 0] + weight * corridor.s_upper[i, 1]
+                line = (1 - weight) * corridor.s[1, i, 0] + weight * corridor.s[1, i, 1]
                 assert line <= bound - moving.margin + 1e-5
 
 
 def test_box_beside_the_path_does_not_matter():
     task = guided([box((5, 50), (2, 4))], 0.0, lateral=False)
-    corridor = build_corridor(task, edges(task))
-    assert corridor.s_upper.min() > 50.0
+    corridor = corridor_of(task)
+    assert corridor.s[1].min() > 50.0
 
 
 def test_passing_on_the_left_closes_the_right():
     task = guided([box((25, 35), (-2, 2))], 0.0, shift=3.0)
-    corridor = build_corridor(task, edges(task))
+    corridor = corridor_of(task)
     beside = (corridor.edges[:-1] >= 2.5) & (corridor.edges[1:] <= 3.5)
-    assert np.all(corridor.l_lower[beside] >= 2.0 + task.margin - 1e-9)
+    assert np.all(corridor.l[0, beside] >= 2.0 + task.margin - 1e-9)
 
 
 def test_no_corridor_where_full_braking_comes_too_far():
     # -8 m/s² takes 6.25 m to the stop, and 0.1 m are kept from the box.
     close = stop_before(6.4)
-    build_corridor(close, edges(close))
+    corridor_of(close)
     closer = stop_before(6.3)
     with pytest.raises(NoCorridor):
-        build_corridor(closer, edges(closer))
+        corridor_of(closer)
 
 
 def test_no_corridor_where_the_start_is_inside():
     task = guided([box((-1, 5), (-1, 1))], -4.0, lateral=False)
     with pytest.raises(NoCorridor):
-        build_corridor(task, edges(task))
+        corridor_of(task)
+
+
+def test_grid_samples_boxes_as_the_occupancy_does():
+    """On and between steps, where an obstacle comes and goes, and beyond the last step."""
+    boxes = [box((18, 24), (-1, 1), v=(3.0, 0.5), present=(0.7, 3.2)), box((40, 45), (-2, 2))]
+    for t_rep, t_end in ((0.0, 4.0), (0.33, 3.77), (4.0, 8.6)):
+        task = problem(boxes, t_rep=t_rep, t_end=t_end)
+        grid = time_grid(task, 7)
+        lower, upper = task.occupancy.at(grid.flat)
+        np.testing.assert_array_equal(grid.at(task.occupancy.lower).reshape(lower.shape), lower)
+        np.testing.assert_array_equal(grid.at(task.occupancy.upper).reshape(upper.shape), upper)
+        assert np.all((grid.t[:, 0] == grid.edges[:-1]) | np.isclose(grid.t[:, 0], grid.edges[:-1]))
+
+
+def test_corridor_without_obstacles_is_what_the_speed_limit_leaves():
+    corridor = corridor_of(problem([], lateral=False))
+    assert np.ptp(corridor.s[1]) == 0.0
+    assert corridor.s[1, 0, 0] == pytest.approx(30.0 * 4.0 + 1.0)
 
 
 # -- backend ---------------------------------------------------------------------------------------
@@ -165,6 +183,55 @@ def test_follows_the_reference_where_nothing_is_in_the_way():
     assert answer.objective == pytest.approx(0.0, abs=1e-9)
 
 
+def test_residuals_and_objective_are_those_of_the_curve():
+    task = guided([box((25, 35), (-2, 2))], 0.0, shift=3.0)
+    backend = QptrBackend(QptrConfig())
+    answer = backend.solve(task)
+    times = np.linspace(0.0, 4.0, 20_001)
+    ours, reference = answer.curve.sample(times), task.reference.sample(times)
+    integrand = np.sum(ours.jerk**2 + 0.1 * (ours.position - reference.position) ** 2, axis=1)
+    # Jerk jumps at the joints, so the midpoints of fine steps are what to expect the integral from.
+    assert answer.objective == pytest.approx(
+        0.5 * (integrand[1:] + integrand[:-1]) @ np.diff(times), rel=1e-3
+    )
+    points = answer.curve.points
+    low, high = corridor_of(task).control_bounds(5)
+    excess = float(np.maximum(points - high, low - points).max())
+    assert answer.residuals["corridor"] == pytest.approx(max(excess, 0.0), abs=1e-9)
+    for order, name in ((1, "velocity"), (2, "acceleration"), (3, "jerk")):
+        limit = {1: (30.0, 3.0), 2: (8.0, 4.0), 3: (60.0, 60.0)}[order]
+        assert np.all(np.abs(answer.curve.derivative_points(order)) <= np.array(limit) + 1e-6), name
+    assert set(answer.residuals) == {"corridor", "velocity", "acceleration", "jerk", "start", "joints"}
+
+
+def test_residuals_tell_a_curve_that_breaks_the_limits(monkeypatch):
+    from repair.baselines import qptr
+
+    def claim(rows, *_):
+        return QpAnswer(SolveStatus.SOLVED, np.full(rows.shape[1], 20.0), 0.0, "claimed")
+
+    monkeypatch.setattr(qptr, "solve_projection", claim)
+    answer = QptrBackend(QptrConfig()).solve(stop_before(20.0))
+    for order, name, low, high in ((1, "velocity", 0.0, 30.0), (2, "acceleration", -8.0, 4.0)):
+        values = answer.curve.derivative_points(order)[..., 0].ravel()[1:]
+        expected = max(values.max() - high, low - values.min())
+        assert expected > 0.1
+        assert answer.residuals[name] == pytest.approx(expected, rel=1e-9)
+    jerk = np.abs(answer.curve.derivative_points(3)[..., 0]).max()
+    assert answer.residuals["jerk"] == pytest.approx(jerk - 60.0, rel=1e-9)
+    assert max(answer.residuals["start"], answer.residuals["joints"]) < 1e-6
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_answer_does_not_depend_on_what_was_solved_before(solver):
+    near, far = stop_before(12.0), stop_before(16.0)
+    backend = QptrBackend(QptrConfig(solver=solver))
+    first = backend.solve(near).curve.points
+    backend.solve(far)
+    np.testing.assert_array_equal(backend.solve(near).curve.points, first)
+    np.testing.assert_array_equal(QptrBackend(QptrConfig(solver=solver)).solve(near).curve.points, first)
+
+
 def test_no_time_left_is_a_status():
     answer = QptrBackend(QptrConfig(solver="osqp")).solve(stop_before(20.0), time_limit=0.0)
     assert answer.status is SolveStatus.TIME_LIMIT
@@ -191,10 +258,10 @@ def test_unknown_solver_names_those_there_are():
 def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
     from repair.baselines import qp
 
-    class Broken:
-        found, x, z, extras = True, np.zeros(18), np.zeros(1000), {}
+    def broken(rows, *_):
+        return qp._Raw(np.zeros(rows.shape[1]), np.zeros(len(rows)), "solved")
 
-    monkeypatch.setattr(qp, "_call", lambda *_: Broken())
+    monkeypatch.setattr(qp, "_call", broken)
     qp._objection.cache_clear()
     with pytest.raises(BackendError, match=r"'daqp' is refused: .*braking problem"):
         require_solver("daqp")
@@ -204,23 +271,74 @@ def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
 def test_answer_is_judged_by_its_residuals_not_by_its_name(monkeypatch):
     from repair.baselines import qp
 
-    origin, rows, limit = braking_problem(14.75)
-
-    class Claims:
-        found, x, z, extras = True, np.full(18, 1e3), np.zeros(len(rows)), {}
-
-    monkeypatch.setattr(qp, "_call", lambda *_: Claims())
-    answer = solve_projection(origin, rows, limit, "daqp")
+    rows, lower, upper = braking_problem(14.75)
+    claim = qp._Raw(np.full(18, 1e3), np.zeros(len(rows)), "solved")
+    monkeypatch.setattr(qp, "_call", lambda *_: claim)
+    answer = solve_projection(rows, lower, upper, "daqp")
     assert answer.z is None
     assert answer.status is SolveStatus.NUMERICAL_ERROR
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_infinite_bounds_bound_nothing_and_nothing_is_written_to(solver):
+    rows, lower, upper = braking_problem(14.75)
+    idle = np.concatenate([rows, rows[:5]])
+    none = np.full(5, np.inf)
+    given = idle.copy(), np.append(lower, -none), np.append(upper, none)
+    expected = solve_projection(rows, lower, upper, solver)
+    found = solve_projection(*given, solver)
+    assert found.status is SolveStatus.SOLVED
+    np.testing.assert_allclose(found.z, expected.z, atol=1e-5)
+    np.testing.assert_array_equal(given[0], idle)
+    # The layout is no matter: daqp itself would read the wrong numbers.
+    strided = np.stack([given[1], given[2]], axis=1)
+    again = solve_projection(np.asfortranarray(idle), strided[:, 0], strided[:, 1], solver)
+    np.testing.assert_allclose(again.z, expected.z, atol=1e-5)
+
+
+@pytest.mark.parametrize("gap", [0.0, 5.0, 13.0, 13.7])
+def test_no_solution_is_proved_without_the_linear_program(gap, monkeypatch):
+    from repair.baselines import qp
+
+    least = infeasibility(*braking_problem(gap))
+    assert 1e-5 < qp._proven_violation(*braking_problem(gap)) <= least + 1e-9
+    monkeypatch.setattr(qp, "infeasibility", lambda *_: pytest.fail("not needed"))
+    assert solve_projection(*braking_problem(gap), "daqp").status is SolveStatus.INFEASIBLE
+
+
+def test_linear_program_decides_where_there_is_no_proof(monkeypatch):
+    from repair.baselines import qp
+
+    monkeypatch.setattr(qp, "_proven_violation", lambda *_: 0.0)
+    assert solve_projection(*braking_problem(13.0), "daqp").status is SolveStatus.INFEASIBLE
+    monkeypatch.setattr(qp, "_call", lambda *_: qp._Raw(None, None, "maximum iterations reached"))
+    assert solve_projection(*braking_problem(14.75), "osqp").status is SolveStatus.ITERATION_LIMIT
+
+
+@pytest.mark.parametrize("gap", [13.76, 13.85, 14.75, 100.0])
+def test_nothing_is_proved_against_a_problem_with_a_solution(gap):
+    from repair.baselines.qp import _proven_violation
+
+    assert _proven_violation(*braking_problem(gap)) == 0.0
+
+
+def test_a_loose_osqp_answer_is_tightened(monkeypatch):
+    from repair.baselines import qp
+
+    exact = solve_projection(*braking_problem(13.85), "daqp").z
+    np.testing.assert_allclose(solve_projection(*braking_problem(13.85), "osqp").z, exact, atol=1e-4)
+    monkeypatch.setattr(qp, "_OSQP_TOLERANCES", qp._OSQP_TOLERANCES[:1])
+    monkeypatch.setitem(qp._SETTINGS["osqp"], "polishing", False)
+    assert solve_projection(*braking_problem(13.85), "osqp").z is None
+
+
 def test_shortest_stop_of_the_braking_problem():
-    assert infeasibility(*braking_problem(13.80)[1:]) == pytest.approx(0.0, abs=1e-9)
-    assert infeasibility(*braking_problem(13.70)[1:]) > 1e-3
+    assert infeasibility(*braking_problem(13.80)) == pytest.approx(0.0, abs=1e-9)
+    assert infeasibility(*braking_problem(13.70)) > 1e-3
 
 
 def test_configuration():
+    assert make(load_config(backend="qptr")).config.solver == "daqp"
     config = load_config(backend="qptr", overrides=["qptr.solver=daqp", "qptr.continuity=3"])
     assert make(config).config.continuity == 3
     with pytest.raises(ConfigError, match=r"qptr\.continuity"):

@@ -64,19 +64,34 @@ class BernsteinCurve:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        tau = np.clip(times - self.t_start, 0.0, self.t_end - self.t_start)
-        piece = np.clip(np.floor(tau / self.duration + 1e-9), 0, len(self.points) - 1).astype(np.intp)
-        u = np.clip(tau / self.duration - piece, 0.0, 1.0)
-        columns = [
-            np.einsum("kn,knd->kd", bernstein_basis(u, self.degree - k), self.derivative_points(k)[piece])
-            for k in range(4)
-        ]
-        beyond = times - self.t_start - tau
+        since = times - self.t_start
+        tau = np.minimum(np.maximum(since, 0.0), self.t_end - self.t_start)
+        pieces, width, _ = self.points.shape
+        # Probes ask for the same offsets over and over; the matrices are worth keeping.
+        matrix = _sampling(np.round(tau, 12).tobytes(), pieces, width - 1, self.duration)
+        stacked = (matrix @ self.points.reshape(pieces * width, 2)).reshape(4, len(times), 2)
+        position, velocity, acceleration, jerk = stacked
+        beyond = since - tau
         out = np.abs(beyond) > 1e-9
-        columns[0][out] += beyond[out, None] * columns[1][out]
-        columns[2][out] = 0.0
-        columns[3][out] = 0.0
-        return FrenetTrajectory(times, *columns)
+        if out.any():
+            position[out] += beyond[out, None] * velocity[out]
+            acceleration[out] = 0.0
+            jerk[out] = 0.0
+        return FrenetTrajectory(times, position, velocity, acceleration, jerk)
+
+
+@lru_cache(maxsize=256)
+def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
+    """Values (4 K, N) of position to jerk at the ``offsets`` since the start."""
+    tau = np.frombuffer(offsets) / duration
+    piece = np.clip(np.floor(tau + 1e-9), 0, pieces - 1).astype(np.intp)
+    u = np.clip(tau - piece, 0.0, 1.0)
+    rows = np.zeros((4, len(tau), pieces, degree + 1))
+    for order in range(4):
+        rows[order, np.arange(len(tau)), piece] = bernstein_basis(u, degree - order) @ _derivative(
+            1, degree, duration, order
+        )
+    return frozen(rows.reshape(4 * len(tau), -1))
 
 
 @dataclass(frozen=True)
@@ -106,12 +121,16 @@ class QpStructure:
         Times of the quadrature since the start [s].
     at_nodes : (K, N) array
         Values of the curve at the nodes.
+    jerk_at_nodes : (K, N) array
+        Jerk of the curve at the nodes.
     weights : (K,) array
         Quadrature weights [s]; exact for the square of a piece.
     hessian : (N, N) array
         Of the objective over x.
-    joints : (J, N) array
+    jumps : (J, N) array
         Jump of position and derivatives at the joints.
+    follow : (N, 3 + K) array
+        Control points with a start state and the least squares fit to values at the nodes.
     """
 
     pieces: int
@@ -125,9 +144,11 @@ class QpStructure:
     reach: tuple[Array, ...]
     nodes: Array
     at_nodes: Array
+    jerk_at_nodes: Array
     weights: Array
     hessian: Array
-    joints: Array
+    jumps: Array
+    follow: Array
 
 
 def _derivative(pieces: int, degree: int, duration: float, order: int) -> Array:
@@ -149,6 +170,60 @@ def _joints(pieces: int, degree: int, continuity: int) -> Array:
     return rows
 
 
+@dataclass(frozen=True)
+class _Unit:
+    """What of a :class:`QpStructure` the duration of a piece only scales: all of it for pieces of 1 s.
+
+    ``null`` (N, m) spans the directions that keep start, joints and end; ``jerk_form`` and
+    ``deviation_form`` are the quadratic forms of the objective's terms over x.
+    """
+
+    lift: Array
+    null: Array
+    derivatives: tuple[Array, ...]
+    nodes: Array
+    at_nodes: Array
+    jerk_at_nodes: Array
+    weights: Array
+    jerk_form: Array
+    deviation_form: Array
+    jumps: Array
+    follow: Array
+
+
+@lru_cache(maxsize=64)
+def _unit(pieces: int, degree: int, continuity: int, settles: bool) -> _Unit:
+    width = degree + 1
+    derivatives = tuple(_derivative(pieces, degree, 1.0, k) for k in range(4))
+    start = np.vstack([derivatives[k][:1] for k in range(3)])
+    joints = _joints(pieces, degree, continuity)
+    end = np.vstack([derivatives[k][-1:] for k in (1, 2)]) if settles else np.empty((0, pieces * width))
+    fixed = np.vstack([start, joints, end])
+    lift = np.linalg.pinv(fixed)[:, :3]
+    null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
+
+    nodes, node_weights = np.polynomial.legendre.leggauss(width)
+    u = 0.5 * (nodes + 1.0)
+    weights = np.tile(0.5 * node_weights, pieces)
+    at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
+    jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
+    fit = null @ np.linalg.pinv(at_nodes @ null)
+    orders = [factorial(degree) / factorial(degree - k) for k in range(continuity + 1)]
+    return _Unit(
+        lift,
+        null,
+        derivatives,
+        (np.arange(pieces)[:, None] + u).ravel(),
+        at_nodes,
+        jerk,
+        weights,
+        jerk.T @ (weights[:, None] * jerk),
+        at_nodes.T @ (weights[:, None] * at_nodes),
+        np.tile(orders, pieces - 1)[:, None] * joints,
+        np.hstack([lift - fit @ (at_nodes @ lift), fit]),
+    )
+
+
 @lru_cache(maxsize=64)
 def qp_structure(
     pieces: int,
@@ -163,39 +238,30 @@ def qp_structure(
 
     With ``settles`` the speed and the acceleration at the end are zero.
     """
-    width = degree + 1
-    derivatives = tuple(_derivative(pieces, degree, duration, k) for k in range(4))
-    start = np.vstack([derivatives[k][:1] for k in range(3)])
-    joints = _joints(pieces, degree, continuity)
-    end = np.vstack([derivatives[k][-1:] for k in (1, 2)]) if settles else np.empty((0, pieces * width))
-    fixed = np.vstack([start, joints, end])
-    lift = np.linalg.pinv(fixed)[:, :3]
-    null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
-
-    nodes, node_weights = np.polynomial.legendre.leggauss(width)
-    u = 0.5 * (nodes + 1.0)
-    weights = np.tile(0.5 * duration * node_weights, pieces)
-    at_nodes = np.kron(np.eye(pieces), bernstein_basis(u, degree))
-    jerk = np.kron(np.eye(pieces), bernstein_basis(u, degree - 3)) @ derivatives[3]
-    hessian = 2.0 * (
-        w_jerk * jerk.T @ (weights[:, None] * jerk) + w_deviation * at_nodes.T @ (weights[:, None] * at_nodes)
-    )
-    factor = np.linalg.cholesky(null.T @ hessian @ null)
-    basis = np.linalg.solve(factor, null.T).T
-    piece = np.arange(pieces)[:, None]
+    h, unit = duration, _unit(pieces, degree, continuity, settles)
+    state = np.array([1.0, h, h**2])  # a speed of 1 is one of h per unit of time
+    hessian = 2.0 * (w_jerk / h**5 * unit.jerk_form + w_deviation * h * unit.deviation_form)
+    factor = np.linalg.cholesky(unit.null.T @ hessian @ unit.null)
+    basis = np.linalg.solve(factor, unit.null.T).T
+    derivatives = tuple(d / h**k for k, d in enumerate(unit.derivatives))
+    follow = unit.follow.copy()
+    follow[:, :3] *= state
+    times = np.arange(pieces)[:, None] + np.arange(degree + 1) / degree
     return QpStructure(
         pieces,
         degree,
         continuity,
         duration,
-        frozen((duration * (piece + np.arange(width) / degree)).ravel()),
-        frozen(lift),
+        frozen(h * times.ravel()),
+        frozen(unit.lift * state),
         frozen(basis),
         tuple(frozen(d) for d in derivatives),
         tuple(frozen(d @ basis) for d in derivatives),
-        frozen((duration * (piece + u)).ravel()),
-        frozen(at_nodes),
-        frozen(weights),
+        frozen(h * unit.nodes),
+        frozen(unit.at_nodes),
+        frozen(unit.jerk_at_nodes / h**3),
+        frozen(h * unit.weights),
         frozen(hessian),
-        frozen(joints),
+        frozen(unit.jumps / h ** np.tile(np.arange(continuity + 1), pieces - 1)[:, None]),
+        frozen(follow),
     )

@@ -4,18 +4,20 @@ Path and speed are planned together in (s, l, t): the control points stay in the
 of the derivatives in the limits, so that the whole curve does; jerk and deviation from the reference
 are minimised. Acceleration is bounded on each axis of the frame, which is all a QP can express: that
 the repaired trajectory also keeps the friction circle, and the lateral acceleration of a curve, is
-for the checker to say.
+for the checker to say. Nothing couples the axes, so each is a QP of its own.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.baselines.bernstein import BernsteinCurve, QpStructure, qp_structure
-from repair.baselines.corridor import Corridor, NoCorridor, build_corridor
+from repair.baselines.corridor import NoCorridor, build_corridor, time_grid
 from repair.baselines.qp import require_solver, solve_projection
 from repair.config import Config, QptrConfig
 from repair.errors import BackendError
@@ -25,17 +27,163 @@ __all__ = ["QptrBackend", "make"]
 
 _FIXED = 1e-9  # a row of smaller norm depends on the start alone
 _START = 1e-4  # by how much the start's own control points may break a bound (m, m/s, ...)
+_FAMILIES = ("corridor", "velocity", "acceleration", "jerk", "start", "joints")
+_WORDS = ("corridor", "speed limits", "acceleration limits", "jerk limits")
+
+
+@dataclass(frozen=True)
+class _AxisQp:
+    """All of one axis's QP that depends on neither start, reference nor corridor.
+
+    What is left is its *task*: the start state and the reference at the quadrature nodes, (3 + K,).
+    With z (m,) free, the control points are ``points @ task + basis @ z``, and z = 0 is the optimum
+    without bounds. The *values* of control points are those of position to jerk, one after the other
+    (R,), then the start state and the jumps at the joints.
+
+    Attributes
+    ----------
+    structure : QpStructure
+    points : (N, 3 + K) array
+    values : (R', N) array
+        Map from control points to their values.
+    families : (6,) int array
+        Where each of ``_FAMILIES`` begins in the values.
+    bounds : (2, R') array
+        Lower and upper bounds of the values, as far as the limits give them.
+    bounded : (B,) int array
+        The values that z moves, then those that follow from the start alone.
+    free : int
+        How many of them z moves.
+    rows : (free, m) array
+        How z moves them, divided by ``scale`` so as to be of unit norm.
+    scale : (B,) array
+    at_rest : (B, 3 + K) array
+        Map from a task to the bounded values at z = 0, divided by ``scale``.
+    terms : (2 K, N) array
+        Map from control points to the terms whose squares add up to the objective: jerk, deviation.
+    weights : (K,) array
+        Of the deviation in ``terms``.
+    """
+
+    structure: QpStructure
+    points: Array
+    values: Array
+    families: npt.NDArray[np.intp]
+    bounds: Array
+    bounded: npt.NDArray[np.intp]
+    free: int
+    rows: Array
+    scale: Array
+    at_rest: Array
+    terms: Array
+    weights: Array
+
+    def objective(self, x: Array, task: Array) -> float:
+        """Jerk and deviation from the task's reference of the control points ``x`` (N,)."""
+        terms = self.terms @ x
+        terms[len(self.weights) :] -= self.weights * task[3:]
+        return float(terms @ terms)
+
+    def violations(self, x: Array, bounds: Array) -> Array:
+        """Largest violation of each of ``_FAMILIES``, negative where a bound is nowhere touched."""
+        values = self.values @ x
+        excess = np.maximum(values - bounds[1], bounds[0] - values)
+        return np.asarray(np.maximum.reduceat(excess, self.families))
+
+    def broken(self, left: Array, name: str) -> str:
+        """Which bound the start alone breaks, from the room ``left`` (2, B) to the bounds; "" if none."""
+        excess = np.maximum(left[0], -left[1])[self.free :]
+        if not excess.max(initial=0.0) > _START:
+            return ""
+        family = np.searchsorted(self.families, self.bounded[self.free :], side="right") - 1
+        worst = [excess[family == k].max(initial=0.0) for k in range(len(_WORDS))]
+        return "; ".join(
+            f"the start state leads {by:.2g} out of the {what} of {name} before anything can be done"
+            for by, what in zip(worst, _WORDS, strict=True)
+            if by > _START
+        )
+
+
+@lru_cache(maxsize=64)
+def _axis_qp(
+    axis: int,
+    limits: Limits,
+    pieces: int,
+    duration: float,
+    degree: int,
+    continuity: int,
+    w_jerk: float,
+    w_deviation: float,
+) -> _AxisQp:
+    """Sideways the repair comes to rest, so as to end parallel to the path; along it the end is free."""
+    s = qp_structure(pieces, degree, duration, continuity, w_jerk, w_deviation, axis == 1)
+    pull = 2.0 * w_deviation * s.at_nodes.T * s.weights
+    given = np.hstack([s.lift, np.zeros_like(pull)])  # control points of the task with z = 0 at their origin
+    origin = s.basis.T @ (np.hstack([np.zeros_like(s.lift), pull]) - s.hessian @ given)
+    points = given + s.basis @ origin
+
+    start = np.vstack([s.derivatives[k][:1] for k in range(3)])
+    jumps = s.jumps if len(s.jumps) else np.zeros((1, len(points)))
+    blocks = (*s.derivatives, start, jumps)
+    values, counts = np.vstack(blocks), [len(block) for block in blocks]
+    families = np.cumsum([0, *counts[:-1]])
+
+    norms = [np.linalg.norm(reach, axis=1) for reach in s.reach]
+    moved = np.concatenate([norm > _FIXED * norm.max(initial=0.0) for norm in norms])
+    bounded, free = np.concatenate([np.flatnonzero(moved), np.flatnonzero(~moved)]), int(moved.sum())
+    scale = np.where(moved, np.concatenate(norms), 1.0)[bounded]
+    bounds = np.zeros((2, len(values)))
+    for k, bound in enumerate(_derivative_bounds(limits, axis), start=1):
+        bounds[:, families[k] : families[k + 1]] = np.array(bound)[:, None]
+        if k < 3:  # speed and acceleration at the start are the reference's doing, not the repair's
+            bounds[:, families[k]] = -np.inf, np.inf
+    weights = np.sqrt(w_deviation * s.weights)
+    return _AxisQp(
+        structure=s,
+        points=points,
+        values=values,
+        families=families,
+        bounds=bounds,
+        bounded=bounded,
+        free=free,
+        rows=np.vstack(s.reach)[bounded[:free]] / scale[:free, None],
+        scale=scale,
+        at_rest=values[bounded] @ points / scale[:, None],
+        terms=np.vstack(
+            [np.sqrt(w_jerk * s.weights)[:, None] * s.jerk_at_nodes, weights[:, None] * s.at_nodes]
+        ),
+        weights=weights,
+    )
+
+
+def _derivative_bounds(limits: Limits, axis: int) -> tuple[tuple[float, float], ...]:
+    """Bounds of speed, acceleration and jerk."""
+    if axis == 0:
+        return (0.0, limits.v_max), (limits.a_min, limits.a_max), (-limits.j_lon, limits.j_lon)
+    return (-limits.v_lat, limits.v_lat), (-limits.a_lat, limits.a_lat), (-limits.j_lat, limits.j_lat)
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """One axis of the QP: control points x = offset + structure.basis @ z, rows @ z <= limit."""
+    """One axis of one problem.
 
-    structure: QpStructure
-    origin: Array
-    rows: Array
-    limit: Array
-    offset: Array
+    Attributes
+    ----------
+    qp : _AxisQp
+    task : (3 + K,) array
+    bounds : (2, R') array
+        Of all values.
+    lower, upper : (free,) array
+        What ``qp.rows @ z`` may be.
+    broken : str
+        Which bound the start alone breaks.
+    """
+
+    qp: _AxisQp
+    task: Array
+    bounds: Array
+    lower: Array
+    upper: Array
     broken: str
 
 
@@ -83,170 +231,99 @@ class QptrBackend:
             raise BackendError(
                 f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration"
             )
-        pieces = max(1, int(np.ceil(duration / self.config.spacing - 1e-9)))
-        edges = np.asarray(problem.t_rep + duration / pieces * np.arange(pieces + 1))
         try:
-            corridor = build_corridor(problem, edges)
+            axes, reference = self._axes(problem, duration)
         except NoCorridor as closed:
             spent = time.perf_counter() - begin
             return SolveResult(SolveStatus.NO_CORRIDOR, build_time=spent, detail=str(closed))
-        axes = [self._axis(problem, corridor, axis) for axis in range(2 if problem.lateral else 1)]
         built = time.perf_counter()
         broken = "; ".join(a.broken for a in axes if a.broken)
         if broken:
             return SolveResult(SolveStatus.INFEASIBLE, build_time=built - begin, detail=broken)
-        origin, rows, limit = _joined(axes)
-        left = None if time_limit is None else time_limit - (built - begin)
-        answer = solve_projection(origin, rows, limit, self.config.solver, left)
+        found: list[Array] = []
+        words: list[str] = []
+        for a in axes:
+            left = None if time_limit is None else time_limit - (time.perf_counter() - begin)
+            answer = solve_projection(a.qp.rows, a.lower, a.upper, self.config.solver, left)
+            if answer.z is None:
+                spent = time.perf_counter() - built
+                return SolveResult(
+                    answer.status, build_time=built - begin, solve_time=spent, detail=answer.detail
+                )
+            found.append(answer.z)
+            words.append(answer.detail)
         solved = time.perf_counter()
-        if answer.z is None:
-            return SolveResult(
-                answer.status, build_time=built - begin, solve_time=solved - built, detail=answer.detail
-            )
-        curve = self._curve(problem, axes, answer.z)
+        curve, objective, residuals = _solution(problem, axes, found, reference)
         return SolveResult(
-            status=answer.status,
+            status=SolveStatus.SOLVED,
             curve=curve,
-            objective=self._objective(problem, axes[0].structure, curve),
+            objective=objective,
             build_time=built - begin,
             solve_time=solved - built,
-            detail=answer.detail,
-            residuals=residuals(problem, corridor, curve, self.config.continuity),
+            detail="; ".join(dict.fromkeys(words)),
+            residuals=residuals,
         )
 
-    def _structure(self, edges: Array, axis: int) -> QpStructure:
-        """Sideways the repair comes to rest, so as to end parallel to the path; along it the end is free."""
-        c, pieces = self.config, len(edges) - 1
-        duration = float(edges[-1] - edges[0]) / pieces
-        return qp_structure(pieces, c.degree, duration, c.continuity, c.w_jerk, c.w_deviation, axis == 1)
+    def _axes(self, problem: RepairProblem, duration: float) -> tuple[list[_Axis], Array]:
+        """The QP of each axis, and the reference at the quadrature nodes (K, 2)."""
+        pieces = max(1, int(np.ceil(duration / self.config.spacing - 1e-9)))
+        grid = time_grid(problem, pieces)
+        # Rounded, so that repairs of the same duration share what has been built for it.
+        length = round(duration / pieces, 12)
+        c = self.config
+        qps = [
+            _axis_qp(axis, problem.limits, pieces, length, c.degree, c.continuity, c.w_jerk, c.w_deviation)
+            for axis in range(2 if problem.lateral else 1)
+        ]
+        times = np.concatenate([grid.flat, problem.t_rep + qps[0].structure.nodes])
+        positions = problem.reference.sample(times).position
+        reference = positions[grid.flat.size :]
+        bounds = build_corridor(problem, grid, positions[: grid.flat.size]).control_bounds(c.degree)
+        return [
+            self._axis(problem, qp, bounds[..., axis].reshape(2, -1), reference, axis)
+            for axis, qp in enumerate(qps)
+        ], reference
 
-    def _axis(self, problem: RepairProblem, corridor: Corridor, axis: int) -> _Axis:
-        structure = self._structure(corridor.edges, axis)
-        reference = problem.reference.sample(problem.t_rep + structure.nodes).position[:, axis]
-        low, high = corridor.control_bounds(structure.degree)
+    def _axis(
+        self, problem: RepairProblem, qp: _AxisQp, corridor: Array, reference: Array, axis: int
+    ) -> _Axis:
         # s from its start: what is left are numbers of the same size on both axes
-        shift = float(problem.start[0, 0]) if axis == 0 else 0.0
-        offset = structure.lift @ (problem.start[:, axis] - [shift, 0.0, 0.0])
-        pull = (
-            2.0 * self.config.w_deviation * structure.at_nodes.T @ (structure.weights * (reference - shift))
-        )
-        lower, upper = _derivative_bounds(problem.limits, structure, axis)
-        lower[0], upper[0] = low[..., axis].ravel() - shift, high[..., axis].ravel() - shift
-        rows, limit, broken = _rows(structure, offset, lower, upper, "sl"[axis])
-        origin = -structure.basis.T @ (structure.hessian @ offset - pull)
-        return _Axis(structure, origin, rows, limit, offset, broken)
-
-    def _curve(self, problem: RepairProblem, axes: list[_Axis], z: Array) -> BernsteinCurve:
-        structure, used = axes[0].structure, 0
-        columns: list[Array] = []
-        for axis in axes:
-            m = len(axis.origin)
-            columns.append(axis.offset + axis.structure.basis @ z[used : used + m])
-            used += m
-        columns[0] = columns[0] + float(problem.start[0, 0])
-        if not problem.lateral:
-            columns.append(_reference_points(problem, structure))
-        shape = (structure.pieces, structure.degree + 1)
-        points = np.stack([c.reshape(shape) for c in columns], axis=2)
-        return BernsteinCurve(problem.t_rep, structure.duration, frozen(points))
-
-    def _objective(self, problem: RepairProblem, structure: QpStructure, curve: BernsteinCurve) -> float:
-        times = problem.t_rep + structure.nodes
-        ours, reference = curve.sample(times), problem.reference.sample(times)
-        jerk = np.sum(ours.jerk**2, axis=1)
-        deviation = np.sum((ours.position - reference.position) ** 2, axis=1)
-        return float(structure.weights @ (self.config.w_jerk * jerk + self.config.w_deviation * deviation))
+        shift = _shift(problem, axis)
+        task = np.concatenate([problem.start[:, axis], reference[:, axis]])
+        task[0] -= shift
+        task[3:] -= shift
+        bounds = qp.bounds.copy()
+        np.subtract(corridor, shift, out=bounds[:, : qp.families[1]])
+        bounds[:, qp.families[4] : qp.families[5]] = task[:3]
+        left = bounds.take(qp.bounded, axis=1)
+        left /= qp.scale
+        left -= qp.at_rest @ task
+        return _Axis(qp, task, bounds, left[0, : qp.free], left[1, : qp.free], qp.broken(left, "sl"[axis]))
 
 
-def _reference_points(problem: RepairProblem, structure: QpStructure) -> Array:
-    """Control points of l that follow the reference (least squares, exact start)."""
-    lateral = problem.reference.sample(problem.t_rep + structure.nodes).position[:, 1]
-    offset = structure.lift @ problem.start[:, 1]
-    fit = np.linalg.lstsq(
-        structure.at_nodes @ structure.basis, lateral - structure.at_nodes @ offset, rcond=None
-    )[0]
-    return np.asarray(offset + structure.basis @ fit)
+def _shift(problem: RepairProblem, axis: int) -> float:
+    return float(problem.start[0, 0]) if axis == 0 else 0.0
 
 
-def _derivative_bounds(limits: Limits, structure: QpStructure, axis: int) -> tuple[list[Array], list[Array]]:
-    """Bounds of the control points of speed, acceleration and jerk; the place of position is left empty."""
-    if axis == 0:
-        low, high = (0.0, limits.a_min, -limits.j_lon), (limits.v_max, limits.a_max, limits.j_lon)
-    else:
-        low = (-limits.v_lat, -limits.a_lat, -limits.j_lat)
-        high = (limits.v_lat, limits.a_lat, limits.j_lat)
-    counts = [structure.pieces * (structure.degree + 1 - k) for k in (1, 2, 3)]
-    lower = [np.empty(0), *(np.full(n, value) for n, value in zip(counts, low, strict=True))]
-    upper = [np.empty(0), *(np.full(n, value) for n, value in zip(counts, high, strict=True))]
-    for k in (1, 2):
-        # Speed and acceleration at the start are the reference's doing, not the repair's.
-        lower[k][0], upper[k][0] = -np.inf, np.inf
-    return lower, upper
-
-
-def _rows(
-    structure: QpStructure, offset: Array, lower: list[Array], upper: list[Array], name: str
-) -> tuple[Array, Array, str]:
-    """Rows of unit norm, their limits, and which bound the start alone breaks ("" if none)."""
-    blocks, limits, broken = [], [], []
-    for k, what in enumerate(("corridor", "speed limits", "acceleration limits", "jerk limits")):
-        value = structure.derivatives[k] @ offset
-        norm = np.linalg.norm(structure.reach[k], axis=1)
-        free = norm > _FIXED * norm.max()
-        excess = np.maximum(value - upper[k], lower[k] - value)[~free].max(initial=-np.inf)
-        if excess > _START:
-            broken.append(
-                f"the start state leads {excess:.2g} out of the {what} of {name} before anything can be done"
-            )
-        for sign, bound in ((1.0, upper[k]), (-1.0, lower[k])):
-            use = free & np.isfinite(bound)
-            blocks.append(sign * structure.reach[k][use] / norm[use, None])
-            limits.append(sign * (bound - value)[use] / norm[use])
-    return np.vstack(blocks), np.concatenate(limits), "; ".join(broken)
-
-
-def _joined(axes: list[_Axis]) -> tuple[Array, Array, Array]:
-    """Both axes as one QP: s(t) and l(t) together."""
-    if len(axes) == 1:
-        return axes[0].origin, axes[0].rows, axes[0].limit
-    from scipy.linalg import block_diag
-
-    return (
-        np.concatenate([a.origin for a in axes]),
-        block_diag(*(a.rows for a in axes)),
-        np.concatenate([a.limit for a in axes]),
-    )
-
-
-def residuals(
-    problem: RepairProblem, corridor: Corridor, curve: BernsteinCurve, continuity: int
-) -> dict[str, float]:
-    """Largest violation of every family of constraints by the control points, in their own units."""
-    limits = problem.limits
-    axes = slice(0, 2 if problem.lateral else 1)
-    low, high = corridor.control_bounds(curve.degree)
-    bounds = {
-        "velocity": ([0.0, -limits.v_lat], [limits.v_max, limits.v_lat]),
-        "acceleration": ([limits.a_min, -limits.a_lat], [limits.a_max, limits.a_lat]),
-        "jerk": ([-limits.j_lon, -limits.j_lat], [limits.j_lon, limits.j_lat]),
-    }
-
-    def excess(values: Array, lower: Array, upper: Array) -> float:
-        return float(np.maximum(values - upper, lower - values)[..., axes].max(initial=0.0))
-
-    found = {"corridor": excess(curve.points, low, high)}
-    for order, (name, (lower, upper)) in enumerate(bounds.items(), start=1):
-        values = curve.derivative_points(order).reshape(-1, 2)
-        found[name] = excess(values[1 if order < 3 else 0 :], np.array(lower), np.array(upper))
-    begin = curve.sample([curve.t_start])
-    state = np.concatenate([begin.position, begin.velocity, begin.acceleration])
-    found["start"] = float(np.abs(state - problem.start)[:, axes].max())
-    jumps = [
-        np.abs(curve.derivative_points(k)[:-1, -1] - curve.derivative_points(k)[1:, 0]).max(initial=0.0)
-        for k in range(continuity + 1)
-    ]
-    found["joints"] = float(max(jumps))
-    return found
+def _solution(
+    problem: RepairProblem, axes: list[_Axis], z: list[Array], reference: Array
+) -> tuple[BernsteinCurve, float, dict[str, float]]:
+    """Curve, objective, and the largest violation of every family of constraints in their own units."""
+    s = axes[0].qp.structure
+    points = np.empty((s.pieces, s.degree + 1, 2))
+    columns = points.reshape(-1, 2)
+    objective, worst = 0.0, np.zeros(len(_FAMILIES))
+    for axis, (a, free) in enumerate(zip(axes, z, strict=True)):
+        x = a.qp.points @ a.task + a.qp.structure.basis @ free
+        np.add(x, _shift(problem, axis), out=columns[:, axis])
+        objective += a.qp.objective(x, a.task)
+        worst = np.maximum(worst, a.qp.violations(x, a.bounds))
+    if not problem.lateral:
+        task = np.concatenate([problem.start[:, 1], reference[:, 1]])
+        columns[:, 1] = s.follow @ task
+        objective += axes[0].qp.objective(columns[:, 1], task)
+    curve = BernsteinCurve(problem.t_rep, s.duration, frozen(points))
+    return curve, objective, dict(zip(_FAMILIES, worst.tolist(), strict=True))
 
 
 def make(config: Config) -> QptrBackend:
