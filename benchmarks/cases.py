@@ -24,7 +24,7 @@ OFFICIAL_FILE = "DEU_Flensburg-6_1_T-1.xml"
 BACKENDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "ego": ("ego", ()),
     "qptr": ("qptr", ()),
-    "qptr daqp": ("qptr", ("qptr.solver=daqp",)),
+    "qptr osqp": ("qptr", ("qptr.solver=osqp",)),
     "casadi sqpmethod": ("casadi", ("casadi.solver=sqpmethod",)),
     "casadi ipopt": ("casadi", ("casadi.solver=ipopt",)),
 }

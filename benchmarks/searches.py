@@ -30,6 +30,7 @@ def whole_search(context: Context, number: int, delta_t: float) -> Report:
     times = together(
         {label: run, **{name: c.search for name, c in made.items()}},
         rounds_within(run, context.rounds(8, 2), 3, context.rounds(21, 5)),
+        shortest=0.03,
     )
     report.rows.append(row(group, label + ", direct check", times[label], note=note))
     for name, c in made.items():
@@ -73,7 +74,8 @@ def one_repair(context: Context, number: int, n_points: int) -> Report:
         "everything": everything,
         "solve": lambda: made.backend.solve(problem),
     }
-    times = together(calls, rounds_within(calls["literal"], context.rounds(5, 2), 5, context.rounds(25, 7)))
+    rounds = rounds_within(calls["literal"], context.rounds(5, 2), 5, context.rounds(25, 7))
+    times = together(calls, rounds, shortest=0.01)
     points = len(made.backend.solve(problem).curve.points)
     against = "literal repair"
     report = Report()

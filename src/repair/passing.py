@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -99,11 +99,11 @@ def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     s += s0 + v0 * tau
     ramp *= rate
     ramp += v0
-    a = rate * (begun & (since < change))
+    changing = begun & (since < change)
     # mean square of the acceleration, and the way that is lost
     loss = (s[0, -1] - s[:, -1]) / max(duration, 1.0)
-    cost = rate[:, 0] * (ramp[:, -1] - v0) / duration + 0.01 * loss**2
-    return _Rollouts(s, ramp, a, cost, s.min(axis=0), s.max(axis=0))
+    cost = rate[:, 0] ** 2 * (np.add.reduce(changing, axis=1) / len(tau)) + 0.01 * loss**2
+    return _Rollouts(s, ramp, rate * changing, cost, s.min(axis=0), s.max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -232,36 +232,58 @@ def open_passings(
         start, tau, reference, lower, upper, conflict, limits, bounds, margin + 0.05, lateral
     )
     speeds = _speed_profiles(start, tau, limits)
-    # Braking in a bend is bound by the friction circle; a guide leaves a tenth of it.
-    bend = np.abs(np.interp(speeds.s, *curvature)) * (speeds.v * speeds.v)
-    usable = bend.max(axis=1) <= 0.9 * limits.a_lat
-    usable &= (bend * bend + speeds.a * speeds.a).max(axis=1) <= (0.9 * limits.a_total) ** 2
     wide_lower, wide_upper = lower - margin, upper + margin
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
     shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]] = []
     for profile in profiles:
         overlap = (wide_lower[..., 1] < profile.l) & (profile.l < wide_upper[..., 1])
-        free = usable & ~_entered(speeds, overlap, wide_lower[..., 0], wide_upper[..., 0])
-        cost = speeds.cost + profile.cost
+        free = ~_entered(speeds, overlap, wide_lower[..., 0], wide_upper[..., 0])
         for maneuver, members in _kinds(profile, conflict, overlap, wide_upper, speeds).items():
-            open_ = (free & members).nonzero()[0]
-            if len(open_):
-                p = int(open_[np.argmin(cost[open_])])
-                if maneuver not in best or cost[p] < best[maneuver][0]:
-                    best[maneuver] = (float(cost[p]), p, profile)
+            p = _gentlest(speeds, free & members, limits, curvature)
+            if p is not None:
+                cost = float(speeds.cost[p] + profile.cost)
+                if maneuver not in best or cost < best[maneuver][0]:
+                    best[maneuver] = (cost, p, profile)
             elif members.any():
                 shut.append((profile, maneuver, members))
     wanted: list[Maneuver | None] = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
     if not best:
         wanted += [Maneuver.LEFT, Maneuver.RIGHT]
     if wanted:
-        excess = np.maximum(np.hypot(bend, speeds.a) - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat)
-        best |= _closest(speeds, shut, wanted, np.maximum(excess.max(axis=1), 0.0), wide_lower, wide_upper)
+        excess = _excess(speeds, slice(None), limits, curvature)
+        best |= _closest(speeds, shut, wanted, excess, wide_lower, wide_upper)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
         for maneuver, (cost, p, profile) in best.items()
     ]
     return tuple(sorted(passings, key=lambda x: x.cost))
+
+
+def _excess(speeds: _Rollouts, p: Any, limits: Limits, curvature: tuple[Array, Array]) -> Array:
+    """By how much the profiles ``p`` break the friction circle, or the lateral limit, in the path's bends.
+
+    A guide leaves a tenth of both to what a backend makes of it.
+    """
+    bend = np.abs(np.interp(speeds.s[p], *curvature)) * (speeds.v[p] * speeds.v[p])
+    acceleration = speeds.a[p]
+    total = np.sqrt(bend * bend + acceleration * acceleration)
+    excess = np.maximum(total - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat)
+    return np.maximum(np.maximum.reduce(excess, axis=-1), 0.0)
+
+
+def _gentlest(
+    speeds: _Rollouts, free: npt.NDArray[np.bool_], limits: Limits, curvature: tuple[Array, Array]
+) -> int | None:
+    """The cheapest of the ``free`` speed profiles (P,) that the bends allow."""
+    candidates = free.nonzero()[0]
+    if not len(candidates):
+        return None
+    # The cheapest is nearly always allowed; looking at all of them takes a hundred times as many numbers.
+    first = int(candidates[speeds.cost[candidates].argmin()])
+    if _excess(speeds, first, limits, curvature) <= 0.0:
+        return first
+    candidates = candidates[_excess(speeds, candidates, limits, curvature) <= 0.0]
+    return int(candidates[speeds.cost[candidates].argmin()]) if len(candidates) else None
 
 
 def _entered(
