@@ -144,8 +144,9 @@ def _standing(points: Array, degree: int) -> Array:
     Non-decreasing control points make the speed non-negative on the whole curve (convex hull).
     """
     result = points.copy()
-    result[degree - 1 :, 0] = np.maximum.accumulate(points[degree - 1 :, 0])
-    return frozen(result)
+    np.maximum.accumulate(points[degree - 1 :, 0], out=result[degree - 1 :, 0])
+    result.setflags(write=False)
+    return result
 
 
 class EgoBackend:
@@ -227,14 +228,15 @@ class EgoBackend:
         """Minimise J; while control points still collide, double lambda_c and start again."""
         config = self.config
         collision = config.deform.collision
-        shape = self._led_points(problem, initial)
+        greville = initial.greville
+        shape = self._led_points(problem, initial, greville)
+        pairs = anchor_pairs(problem, greville, shape, self.degree)
         minimum = Minimum(initial.points, np.inf, 0, False)
         led = shape
         rounds = 0
         for _ in range(config.rebounds + 1):
             rounds += 1
             cap = self._cap(problem, led)
-            pairs = anchor_pairs(problem, initial.greville, shape, self.degree)
             minimum = self._minimise_deformation(problem, minimum.points, pairs, collision, cap, deadline)
             led = minimum.points
             clear = _closest(pairs, led) >= 0.0
@@ -249,14 +251,14 @@ class EgoBackend:
         allowed = 1.02 * self.spacing * _bend_speed(problem, points)
         return bool((points[1:, 0] - points[:-1, 0] <= allowed).all())
 
-    def _led_points(self, problem: RepairProblem, initial: UniformBSpline) -> Array:
+    def _led_points(self, problem: RepairProblem, initial: UniformBSpline, times: Array) -> Array:
         """Where the guide leads the control points (the reference where there is no guide)."""
         if problem.passing is None:
             return initial.points
         guide = problem.passing.guide
         led = np.empty_like(initial.points)
         for k in (0, 1):
-            led[:, k] = np.interp(initial.greville, guide.t, guide.position[:, k])
+            led[:, k] = np.interp(times, guide.t, guide.position[:, k])
         led[: self.degree] = initial.points[: self.degree]
         return led
 

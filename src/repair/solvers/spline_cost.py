@@ -130,7 +130,13 @@ class SplineCost:
         self._limit[:rows] -= x
         self._limit[rows : 2 * rows] += x
         self._limit[2 * rows :] -= points.ravel()[paired] * sign
+        # What is bounded, filled anew in every evaluation: x, -x, and the paired coordinates.
         self._quantities = np.empty(2 * rows + len(paired))
+        self._parts = (
+            self._quantities[:rows],
+            self._quantities[rows : 2 * rows],
+            self._quantities[2 * rows :],
+        )
 
     def points(self, u: Array) -> Array:
         """Control points (n, axes) at the displacements u."""
@@ -140,19 +146,19 @@ class SplineCost:
 
     def __call__(self, u: Array) -> Point:
         """Value, gradient and curvatures at u."""
-        rows, moved = self._rows, self._quantities
-        free = self._structure.free
-        change = (free @ u.reshape(-1, self.axes)).ravel()
-        moved[:rows] = change
-        np.negative(change, out=moved[rows : 2 * rows])
-        np.multiply(u[self._coordinate], self._sign, out=moved[2 * rows :])
-        penalty, slope, curvature = self._bounds.evaluate(moved, self._limit)
+        rows, free = self._rows, self._structure.free
+        x, negative, paired = self._parts
+        change = free.dot(u.reshape(-1, self.axes)).ravel()
+        x[:] = change
+        np.negative(change, out=negative)
+        np.multiply(u.take(self._coordinate), self._sign, out=paired)
+        penalty, slope, curvature = self._bounds.evaluate(self._quantities, self._limit)
         change += self._derivatives
         bent = self._structure.smooth * change
         value = self._constant + 0.5 * float(bent.dot(change)) + penalty
         bent += slope[:rows]
         bent -= slope[rows : 2 * rows]
-        gradient = (free.T @ bent.reshape(-1, self.axes)).ravel()
+        gradient = free.T.dot(bent.reshape(-1, self.axes)).ravel()
         if len(self._coordinate):
             gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
         if self._fit is not None:
