@@ -656,9 +656,9 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     costs: list[Any] = []
 
     class Spy(fast.EgoBackend):
-        def _minimise(self, cost: Any, *arguments: Any) -> Any:
+        def _minimise(self, cost: Any, *arguments: Any, **keys: Any) -> Any:
             costs.append(cost)
-            return super()._minimise(cost, *arguments)
+            return super()._minimise(cost, *arguments, **keys)
 
     Spy(ego, degree=p, spacing=dt).solve(problem)
     times = {

@@ -193,13 +193,17 @@ def splice_points(derivatives: npt.ArrayLike, degree: int, spacing: float) -> Ar
 
 @lru_cache(maxsize=64)
 def _fit_operator(n: int, degree: int, spacing: float, per_segment: int) -> tuple[Array, Array, Array]:
+    """Times (K,) to look at, and the maps (n, K) and (n, p) from positions there and from the start state."""
     tau = np.linspace(0.0, (n - degree) * spacing, (n - degree) * per_segment + 1)
     basis = basis_matrix(tau, n, degree, spacing)
     # A whisper of smoothing keeps the last, hardly observed control points on the polynomial.
     ridge = 1e-6 * derivative_matrix(n, degree, 1.0)
     stacked = np.vstack([basis, ridge])
     free = np.linalg.pinv(stacked[:, degree:])
-    return frozen(tau), frozen(free[:, : len(tau)]), frozen(free @ stacked[:, :degree])
+    head = _start_inverse(degree, spacing)
+    begin = np.vstack([head, -free @ stacked[:, :degree] @ head])
+    fitted = np.vstack([np.zeros((degree, len(tau))), free[:, : len(tau)]])
+    return frozen(tau), frozen(fitted), frozen(begin)
 
 
 def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: float) -> UniformBSpline:
@@ -208,13 +212,12 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     Position, velocity and acceleration at ``t_start`` are reproduced exactly (and the jerk for
     degree 4 and up); the remaining control points fit the positions.
     """
-    tau, operator, correction = _fit_operator(n, degree, spacing, 4)
+    tau, fitted, begin = _fit_operator(n, degree, spacing, 4)
     samples = curve.sample(t_start + tau)
     state = np.zeros((max(degree, 4), 2))
     for row, column in enumerate((samples.position, samples.velocity, samples.acceleration, samples.jerk)):
         state[row] = column[0]
-    points = np.empty((n, 2))
-    head = points[:degree] = splice_points(state[:degree], degree, spacing)
-    points[degree:] = operator @ samples.position - correction @ head
+    points = fitted @ samples.position
+    points += begin @ state[:degree]
     points.setflags(write=False)
     return UniformBSpline(t_start, spacing, degree, points)

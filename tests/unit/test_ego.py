@@ -66,8 +66,8 @@ def run(monkeypatch, problem, config=None, **keys):
     made = []
     minimise = ego.EgoBackend._minimise
 
-    def spy(self, cost, start, deadline):
-        made.append((cost, minimise(self, cost, start, deadline)))
+    def spy(self, cost, *arguments, **keys):
+        made.append((cost, minimise(self, cost, *arguments, **keys)))
         return made[-1][1]
 
     monkeypatch.setattr(ego.EgoBackend, "_minimise", spy)

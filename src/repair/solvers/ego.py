@@ -256,9 +256,9 @@ class EgoBackend:
         if problem.passing is None:
             return initial.points
         guide = problem.passing.guide
-        led = np.empty_like(initial.points)
-        for k in (0, 1):
-            led[:, k] = np.interp(times, guide.t, guide.position[:, k])
+        # Both axes at once, as the parts of complex numbers.
+        position = np.ascontiguousarray(guide.position).view(np.complex128)[:, 0]
+        led = np.interp(times, guide.t, position).view(np.float64).reshape(-1, 2)
         led[: self.degree] = initial.points[: self.degree]
         return led
 
@@ -314,11 +314,13 @@ class EgoBackend:
         cost = SplineCost(points[:, 1:], 0, n, self.spacing, weights.smooth, bounds)
         return cost(np.zeros(n)).value
 
-    def _minimise(self, cost: SplineCost, start: Array, deadline: float | None) -> Minimum:
+    def _minimise(
+        self, cost: SplineCost, start: Array, deadline: float | None, near_closed_form: bool = False
+    ) -> Minimum:
         """Minimise over the free control points; what the cost does not know of stays as in ``start``."""
         c = self.config
         if c.solver == "newton":
-            minimum = newton(cost, c.max_iterations, c.tolerance, deadline)
+            minimum = newton(cost, c.max_iterations, c.tolerance, deadline, near_closed_form=near_closed_form)
         else:
             minimum = lbfgs(cost, c.max_iterations, c.tolerance, deadline, precondition=c.precondition)
         axes = minimum.points.shape[1]
@@ -344,7 +346,7 @@ class EgoBackend:
             fit=fitting_band(points, p, self.spacing, weights.fit, axes),
             constant=self._resting(problem, points, weights),
         )  # fmt: skip
-        return self._minimise(cost, points, deadline)
+        return self._minimise(cost, points, deadline, near_closed_form=True)
 
 
 def make(config: Config) -> EgoBackend:

@@ -38,7 +38,14 @@ def _in_time(deadline: float | None) -> None:
         raise OutOfTime
 
 
-def newton(cost: SplineCost, limit: int, tolerance: float, deadline: float | None = None) -> Minimum:
+def newton(
+    cost: SplineCost,
+    limit: int,
+    tolerance: float,
+    deadline: float | None = None,
+    *,
+    near_closed_form: bool = False,
+) -> Minimum:
     """Newton's method with a backtracking line search (Boyd and Vandenberghe, *Convex Optimization*, 9.5).
 
     Parameters
@@ -50,13 +57,17 @@ def newton(cost: SplineCost, limit: int, tolerance: float, deadline: float | Non
         after a step with the Hessian from before it.
     deadline : float, optional
         Of :func:`time.perf_counter` [s].
+    near_closed_form : bool
+        Begin at the minimum of the quadratic part, and not at u = 0; without active penalties that is all.
 
     Raises
     ------
     OutOfTime
     """
-    u = np.zeros(cost.size)
+    u = cost.closed_form() if near_closed_form else np.zeros(cost.size)
     here = cost(u)
+    if near_closed_form and not here.curvature.any():
+        return Minimum(cost.points(u), here.value, 1, True)
     for iteration in range(1, limit + 1):
         _in_time(deadline)
         factor, failed = dpbtrf(cost.hessian(here), lower=1)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg.blas import dsbmv
+from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from repair.bspline import basis_matrix, derivative_matrix
 from repair.solvers.penalties import SoftBounds
@@ -166,6 +167,12 @@ class SplineCost:
             value += 0.5 * float(pull.dot(u))
             gradient += pull
         return Point(value, gradient, curvature)
+
+    def closed_form(self) -> Array:
+        """The u that minimises the quadratic part; the whole cost, where no penalty is active there."""
+        bent = self._structure.smooth * self._derivatives
+        slope = self._structure.free.T.dot(bent.reshape(-1, self.axes)).ravel()
+        return -np.asarray(dpbtrs(dpbtrf(self.quadratic(), lower=1)[0], slope, lower=1)[0])
 
     def quadratic(self) -> Array:
         """Band of the Hessian where no penalty is active; see :meth:`hessian`."""
