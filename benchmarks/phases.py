@@ -18,14 +18,15 @@ from benchmarks.measure import Report, Row, Spread, Times, row, together
 #: phase -> where its time is spent, "module:name" or "module:Class.name". Time inside a phase that belongs
 #: to another phase counts for that other phase only.
 CHECKS = {
-    "sampling": "repair.checker:Checker._path",
-    "driven states": "repair.checker:Checker._drive",
+    "path in the plane": "repair.checker:Checker._spliced",
+    "driven states": "repair.checker:body_angles",
     "limits": "repair.checker:Checker._limits",
     "margin check": "repair.checker:Checker._margin",
     "collision check": "repair.collision:CollisionWorld.contact",
-    "road check": "repair.collision:RoadBoundary.first_off_road",
-    "kinematic check, direct": "repair.checker:direct_check",
+    "road check": "repair.checker:Checker._off_road",
+    "kinematic check, direct": "repair.checker:Checker._kinematics",
     "kinematic check, drivability checker": "repair.checker:official_check",
+    "rest of the check": "repair.checker:Checker.check",
     "problem, culling": "repair.problems:ProblemFactory.at",
     "ways past (passings)": "repair.problems:open_passings",
 }
@@ -33,6 +34,7 @@ SOLVING = {
     "ego": {
         "fit to the reference": "repair.solvers.ego:fit_to_curve",
         "{p, v} pairs": "repair.solvers.ego:anchor_pairs",
+        "cost and gradient": "repair.solvers.spline_cost:SplineCost.__call__",
         "deformation": "repair.solvers.ego:EgoBackend._deform",
         "refinement": "repair.solvers.ego:EgoBackend._refine",
         "rest of the solve": "repair.solvers.ego:EgoBackend.solve",
@@ -167,7 +169,8 @@ def shares(context: Context, number: int, backend: str) -> Report:
         Row(group, "whole, with the stopwatch", "ms", total, None, Spread.of(base / np.asarray(whole)), label)
     )
     if kind == "ego":
-        solving = sum(np.asarray(parts[name]) for name in ("deformation", "refinement") if name in parts)
+        stages = ("deformation", "refinement", "cost and gradient")
+        solving = sum(np.asarray(parts[name]) for name in stages if name in parts)
         slow = Spread.of(slow_parts["optimisation"]).median
         report.rows.append(Row(
             group, "deformation + refinement", "ms", Spread.of(solving).scaled(1e3), None,
