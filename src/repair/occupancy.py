@@ -182,4 +182,4 @@ def near(
     """
     bound = np.array([reach[0], -reach[1], l_room[0], -l_room[1]])[:, None, None]
     within = np.logical_and.reduce(occupancy.swept[:, :, steps] > bound, axis=0)
-    return np.asarray(within.any(axis=1))
+    return np.asarray(np.logical_or.reduce(within, axis=1))
