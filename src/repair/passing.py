@@ -230,8 +230,8 @@ def _lateral_profiles(
         return profiles
     right, left = bounds.at(s)
     targets = (
-        (Maneuver.LEFT, float(np.nanmax(upper[j, beside, 1])) + margin),
-        (Maneuver.RIGHT, float(np.nanmin(lower[j, beside, 1])) - margin),
+        (Maneuver.LEFT, float(np.fmax.reduce(upper[j, beside, 1])) + margin),
+        (Maneuver.RIGHT, float(np.fmin.reduce(lower[j, beside, 1])) - margin),
     )
     for maneuver, target in targets:
         if not right[beside].max() - 1e-6 <= target <= left[beside].min() + 1e-6:
