@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.types import Array, FrenetTrajectory, Occupancy, frozen
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from repair.scene.frame import FrenetFrame
     from repair.scene.obstacles import Obstacle
 
-__all__ = ["build_occupancy", "first_entry", "relevant", "shrink_to_start"]
+__all__ = ["build_occupancy", "first_entry", "near", "relevant", "shrink_to_start"]
 
 
 def build_occupancy(
@@ -163,11 +164,22 @@ def relevant(
     last_step = len(occupancy.t) - 1
     first = max(int(occupancy.t.searchsorted(t_start + 1e-9, side="right")) - 1, 0)
     last = min(int(occupancy.t.searchsorted(t_end - 1e-9, side="left")), last_step)
-    # Between two steps a box stays within what both of them span.
-    lower, upper = occupancy.swept if last > first else (occupancy.lower, occupancy.upper)
-    steps = slice(first, max(last, first + 1))
-    near = (upper[:, steps, 0] > reach[0]) & (lower[:, steps, 0] < reach[1])
-    near &= upper[:, steps, 1] > l_room[0]
-    near &= lower[:, steps, 1] < l_room[1]
-    kept = near.any(axis=1)
+    if last > first:
+        kept = near(occupancy, slice(first, last), reach, l_room)
+    else:  # a single step, at which the boxes are what they are
+        lower, upper = occupancy.lower[:, first], occupancy.upper[:, first]
+        smallest, largest = np.array([reach, l_room]).T
+        kept = ((upper > smallest) & (lower < largest)).all(axis=1)
     return occupancy if kept.all() else occupancy.select(kept)
+
+
+def near(
+    occupancy: Occupancy, steps: slice, reach: Sequence[float] | Array, l_room: Sequence[float] | Array
+) -> npt.NDArray[np.bool_]:
+    """Which obstacles (N,) are within reach and room in one of the steps (between two steps of the scenario).
+
+    Between two steps a box stays within what both of them span.
+    """
+    bound = np.array([reach[0], -reach[1], l_room[0], -l_room[1]])[:, None, None]
+    within = np.logical_and.reduce(occupancy.swept[:, :, steps] > bound, axis=0)
+    return np.asarray(np.logical_or.reduce(within, axis=1))

@@ -10,9 +10,9 @@ limits; it shows that a way is open, and a backend makes a trajectory of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,44 +25,57 @@ from repair.types import (
     Maneuver,
     Occupancy,
     Passing,
-    Side,
     frozen,
 )
 
-__all__ = ["open_passings"]
+__all__ = ["Surroundings", "inside", "open_passings", "overlapping", "sides_of", "surroundings"]
 
 # Shares of the acceleration limits, and of the start speed, that are rolled out.
 _BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
 _THROTTLE = (0.5, 1.0)
+_GAINS = (2.0, 5.0, 50.0)
 _DELAYS = (0.0, 1.5, 3.0)
 _HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
 
 
-class _Rollouts(NamedTuple):
-    """Speed profiles over the guide's times.
-
-    Position, speed and acceleration (P, K), costs (P,), and how far back and forth any of them gets (K,).
-    """
-
-    s: Array
-    v: Array
-    a: Array
-    cost: Array
-    least: Array
-    most: Array
-
-
 class _Family(NamedTuple):
-    """Rate, share of the start speed and gain of every profile, (P, 1) each, and the time since it began.
+    """What all speed profiles have in common that start at the same time before the end.
 
     A profile holds the speed v0 for a delay, then changes it at the rate to share * v0 + gain.
     """
 
-    rate: Array
+    rate: Array  # (P,), as are share and gain
     share: Array
     gain: Array
-    begun: npt.NDArray[np.bool_]  # (P, K)
-    since: Array  # (P, K), 0 before it
+    square: Array  # of the rate
+    half: Array  # (K, P), half of the rate: arrays of one shape are multiplied twice as fast
+    since: Array  # (K, P), the time since the change began, 0 before it
+    begun: Array  # (K, P), the same, but inf before it
+    slowest: int
+    fastest: int
+
+
+class _Rollouts(NamedTuple):
+    """Speed profiles over the guide's times; speed and acceleration are made for those that are looked at.
+
+    Position s and time spent changing the speed (K, P), how long the change takes and cost (P,), and
+    how far back and forth any of them gets (K,).
+    """
+
+    family: _Family
+    v0: float
+    s: Array
+    ramp: Array
+    change: Array
+    cost: Array
+    least: Array
+    most: Array
+
+    def motion(self, p: int | slice | npt.NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """Position, speed and acceleration of the profiles ``p``, (K,) or (K, P')."""
+        rate = self.family.rate[p]
+        v = rate * self.ramp[:, p] + self.v0
+        return self.s[:, p], v, rate * (self.family.begun[:, p] < self.change[p])
 
 
 @lru_cache(maxsize=64)
@@ -74,40 +87,50 @@ def _family(a_min: float, a_max: float, count: int, step: float) -> _Family:
     family += [
         (delay, share * a_max, 1.0, gain)
         for share in _THROTTLE
-        for gain in (2.0, 5.0, 50.0)
+        for gain in _GAINS
         for delay in _DELAYS
         if delay < tau[-1]
     ]
-    delay, rate, share, gain = (frozen(column[:, None]) for column in np.array(family).T)
-    return _Family(rate, share, gain, tau >= delay, frozen(np.maximum(tau - delay, 0.0)))
+    hardest = (0.0, _THROTTLE[-1] * a_max, 1.0, _GAINS[-1])
+    delay, rate, share, gain = (frozen(column) for column in np.array(family).T)
+    since = tau[:, None] - delay
+    return _Family(
+        rate,
+        share,
+        gain,
+        square=frozen(rate**2),
+        half=frozen(np.broadcast_to(0.5 * rate, since.shape)),
+        since=frozen(np.maximum(since, 0.0)),
+        begun=frozen(np.where(since >= 0.0, since, np.inf)),
+        slowest=family.index((0.0, _BRAKING[-1] * a_min, _HOLD[0], 0.0)),
+        fastest=family.index(hardest) if hardest in family else 0,
+    )
 
 
 def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
-    duration = max(float(tau[-1]), 1e-9)
-    step = round(duration / max(len(tau) - 1, 1), 9)
-    rate, share, gain, begun, since = _family(limits.a_min, limits.a_max, len(tau), step)
-    rise = np.minimum(share * v0 + gain, max(limits.v_max, v0)) - v0
-    change = rise / rate
-    ramp = np.minimum(since, change)
+    count, duration = len(tau), max(float(tau[-1]), 1e-9)
+    family = _family(limits.a_min, limits.a_max, count, round(duration / max(count - 1, 1), 9))
+    rise = np.minimum(family.share * v0 + family.gain, max(limits.v_max, v0)) - v0
+    change = rise / family.rate
+    ramp = np.minimum(family.since, change)
     # v0 tau + rate ramp^2 / 2 + rise (since - ramp)
-    s = (0.5 * rate) * ramp
+    s = family.half * ramp
     s -= rise
     s *= ramp
-    s += rise * since
-    s += s0 + v0 * tau
-    ramp *= rate
-    ramp += v0
-    changing = begun & (since < change)
+    s += rise * family.since
+    s += (s0 + v0 * tau)[:, None]
     # mean square of the acceleration, and the way that is lost
-    loss = (s[0, -1] - s[:, -1]) / max(duration, 1.0)
-    cost = rate[:, 0] ** 2 * (np.add.reduce(changing, axis=1) / len(tau)) + 0.01 * loss**2
-    return _Rollouts(s, ramp, rate * changing, cost, s.min(axis=0), s.max(axis=0))
+    last = s[-1]
+    loss = (last[0] - last) / max(duration, 1.0)
+    changing = np.add.reduce(family.begun < change, axis=0)
+    cost = family.square * (changing / count) + 0.01 * (loss * loss)
+    # Who brakes hardest and to a stop is behind all others at any time, who accelerates hardest ahead.
+    return _Rollouts(family, v0, s, ramp, change, cost, least=s[:, family.slowest], most=s[:, family.fastest])
 
 
-@dataclass(frozen=True)
-class _LateralProfile:
+class _LateralProfile(NamedTuple):
     """One lateral motion l(t) (K,) with its derivatives and cost."""
 
     maneuver: Maneuver | None  # None: keeps the path; yield or go ahead is decided by the speed
@@ -134,10 +157,47 @@ def _quintic(start: Array, target: float, duration: float, tau: Array) -> tuple[
     return position, np.where(moving, rate, 0.0), np.where(moving, acceleration, 0.0)
 
 
-def _conflict(lower: Array, upper: Array, path: Array) -> tuple[int, int] | None:
-    """First (time index, obstacle) whose box the path (K, 2) enters."""
-    inside = (lower < path) & (path < upper)
-    hit = inside[..., 0] & inside[..., 1]
+class Surroundings(NamedTuple):
+    """The boxes at the guide's times, and what they are to the reference.
+
+    Attributes
+    ----------
+    lower, upper : (N, K, 2) array
+        Corners of the boxes; NaN where an obstacle is absent.
+    conflict : (k, j) or None
+        First time index, and obstacle, at which the reference is inside of a box.
+    overlap : (N, K) bool array
+        Which boxes, the margin added, the reference overlaps sideways.
+    """
+
+    lower: Array
+    upper: Array
+    conflict: tuple[int, int] | None
+    overlap: npt.NDArray[np.bool_]
+
+
+def surroundings(reference: FrenetTrajectory, occupancy: Occupancy, margin: float) -> Surroundings:
+    """Look them up at the reference's times, whatever these are."""
+    lower, upper = occupancy.at(reference.t)
+    conflict = _conflict(inside(lower, upper, reference.position))
+    return Surroundings(
+        lower, upper, conflict, overlapping(lower - margin, upper + margin, reference.position[:, 1])
+    )
+
+
+def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
+    """Which boxes (N, K) the path (K, 2) is in."""
+    within = (lower < path) & (path < upper)
+    return within[..., 0] & within[..., 1]
+
+
+def overlapping(lower: Array, upper: Array, l: Array) -> npt.NDArray[np.bool_]:  # noqa: E741
+    """Which boxes (N, K) the lateral motion l (K,) overlaps sideways."""
+    return (lower[..., 1] < l) & (l < upper[..., 1])
+
+
+def _conflict(hit: npt.NDArray[np.bool_]) -> tuple[int, int] | None:
+    """First (time index, obstacle) of the hits (N, K)."""
     times = hit.any(axis=0)
     if not times.any():
         return None
@@ -157,7 +217,7 @@ def _lateral_profiles(
     margin: float,
     lateral: bool,
 ) -> list[_LateralProfile]:
-    zero = np.zeros_like(tau)
+    zero = np.zeros(len(tau))
     keep = _LateralProfile(None, reference.position[:, 1], reference.velocity[:, 1], zero, 0.0)
     profiles = [keep]
     if not lateral or conflict is None:
@@ -170,8 +230,8 @@ def _lateral_profiles(
         return profiles
     right, left = bounds.at(s)
     targets = (
-        (Maneuver.LEFT, float(np.nanmax(upper[j, beside, 1])) + margin),
-        (Maneuver.RIGHT, float(np.nanmin(lower[j, beside, 1])) - margin),
+        (Maneuver.LEFT, float(np.fmax.reduce(upper[j, beside, 1])) + margin),
+        (Maneuver.RIGHT, float(np.fmin.reduce(lower[j, beside, 1])) - margin),
     )
     for maneuver, target in targets:
         if not right[beside].max() - 1e-6 <= target <= left[beside].min() + 1e-6:
@@ -198,6 +258,7 @@ def open_passings(
     margin: float,
     lateral: bool,
     curvature: tuple[Array, Array],
+    boxes: Surroundings | None = None,
 ) -> tuple[Passing, ...]:
     """The open ways past the obstacles, the gentlest of each manoeuvre, cheapest first.
 
@@ -217,6 +278,8 @@ def open_passings(
         Whether moving sideways is allowed.
     curvature : (s, kappa) arrays
         Curvature of the path, for the lateral acceleration.
+    boxes : Surroundings, optional
+        What :func:`surroundings` says of the reference, the obstacles and the margin, if it is known.
 
     Returns
     -------
@@ -226,8 +289,7 @@ def open_passings(
         boxes are wider than the vehicles, so it is for the checker to say that they fail.
     """
     tau = reference.t - reference.t[0]
-    lower, upper = occupancy.at(reference.t)
-    conflict = _conflict(lower, upper, reference.position)
+    lower, upper, conflict, overlap = boxes or surroundings(reference, occupancy, margin)
     profiles = _lateral_profiles(
         start, tau, reference, lower, upper, conflict, limits, bounds, margin + 0.05, lateral
     )
@@ -236,21 +298,20 @@ def open_passings(
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
     shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]] = []
     for profile in profiles:
-        overlap = (wide_lower[..., 1] < profile.l) & (profile.l < wide_upper[..., 1])
+        if profile.maneuver is not None:
+            overlap = overlapping(wide_lower, wide_upper, profile.l)
         free = ~_entered(speeds, overlap, wide_lower[..., 0], wide_upper[..., 0])
-        for maneuver, members in _kinds(profile, conflict, overlap, wide_upper, speeds).items():
+        for maneuver, members in _kinds(profile, conflict, overlap, wide_upper, speeds):
             p = _gentlest(speeds, free & members, limits, curvature)
             if p is not None:
-                cost = float(speeds.cost[p] + profile.cost)
+                cost = float(speeds.cost[p]) + profile.cost
                 if maneuver not in best or cost < best[maneuver][0]:
                     best[maneuver] = (cost, p, profile)
             elif members.any():
                 shut.append((profile, maneuver, members))
-    wanted: list[Maneuver | None] = [] if best.keys() & {Maneuver.YIELD, Maneuver.GO_AHEAD} else [None]
-    if not best:
-        wanted += [Maneuver.LEFT, Maneuver.RIGHT]
-    if wanted:
-        excess = _excess(speeds, slice(None), limits, curvature)
+    if Maneuver.YIELD not in best and Maneuver.GO_AHEAD not in best:
+        wanted: list[Maneuver | None] = [None] if best else [None, Maneuver.LEFT, Maneuver.RIGHT]
+        excess = _excess(speeds.motion(slice(None)), limits, curvature)
         best |= _closest(speeds, shut, wanted, excess, wide_lower, wide_upper)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
@@ -259,16 +320,48 @@ def open_passings(
     return tuple(sorted(passings, key=lambda x: x.cost))
 
 
-def _excess(speeds: _Rollouts, p: Any, limits: Limits, curvature: tuple[Array, Array]) -> Array:
-    """By how much the profiles ``p`` break the friction circle, or the lateral limit, in the path's bends.
+def _demand(motion: tuple[Array, Array, Array], curvature: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Largest total and lateral acceleration of motions (K, P') along the path, bends included."""
+    s, v, acceleration = motion
+    bend = np.abs(np.interp(s, *curvature)) * (v * v)
+    total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))
+    return total, np.maximum.reduce(bend, axis=0)
 
-    A guide leaves a tenth of both to what a backend makes of it.
+
+# Share of the friction circle and of the lateral limit that a guide may use: a tenth of both is left
+# to what a backend makes of it.
+_GUIDED = 0.9
+
+
+def _allowed(
+    motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple[Array, Array]
+) -> npt.NDArray[np.bool_]:
+    """Which motions keep to the friction circle and the lateral limit in the path's bends."""
+    total, lateral = _demand(motion, curvature)
+    return (total <= _GUIDED * limits.a_total) & (lateral <= _GUIDED * limits.a_lat)
+
+
+def _surely_allowed(speeds: _Rollouts, p: int, limits: Limits, curvature: tuple[Array, Array]) -> bool:
+    """Whether a profile keeps to both even if it took the sharpest bend on its way at its highest speed.
+
+    Nearly all do, and this takes a few numbers only; of the others it says nothing.
     """
-    bend = np.abs(np.interp(speeds.s[p], *curvature)) * (speeds.v[p] * speeds.v[p])
-    acceleration = speeds.a[p]
-    total = np.sqrt(bend * bend + acceleration * acceleration)
-    excess = np.maximum(total - 0.9 * limits.a_total, bend - 0.9 * limits.a_lat)
-    return np.maximum(np.maximum.reduce(excess, axis=-1), 0.0)
+    where, kappa = curvature
+    first, last = where.searchsorted((speeds.s[0, p], speeds.s[-1, p])).tolist()
+    sharpest = float(np.maximum.reduce(np.abs(kappa[max(first - 1, 0) : last + 1])))
+    rate = float(speeds.family.rate[p])
+    highest = speeds.v0 + max(rate * float(speeds.ramp[-1, p]), 0.0)
+    # A little more than the true numbers, which are rounded in another order.
+    bend = (1.0 + 1e-9) * sharpest * highest**2
+    total = (1.0 + 1e-9) * math.hypot(bend, rate)
+    return total <= _GUIDED * limits.a_total and bend <= _GUIDED * limits.a_lat
+
+
+def _excess(motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple[Array, Array]) -> Array:
+    """By how much they do not."""
+    total, lateral = _demand(motion, curvature)
+    excess = np.maximum(total - _GUIDED * limits.a_total, lateral - _GUIDED * limits.a_lat)
+    return np.asarray(np.maximum(excess, 0.0))
 
 
 def _gentlest(
@@ -280,9 +373,9 @@ def _gentlest(
         return None
     # The cheapest is nearly always allowed; looking at all of them takes a hundred times as many numbers.
     first = int(candidates[speeds.cost[candidates].argmin()])
-    if _excess(speeds, first, limits, curvature) <= 0.0:
+    if _surely_allowed(speeds, first, limits, curvature) or _allowed(speeds.motion(first), limits, curvature):
         return first
-    candidates = candidates[_excess(speeds, candidates, limits, curvature) <= 0.0]
+    candidates = candidates[_allowed(speeds.motion(candidates), limits, curvature)]
     return int(candidates[speeds.cost[candidates].argmin()]) if len(candidates) else None
 
 
@@ -290,10 +383,11 @@ def _entered(
     speeds: _Rollouts, overlap: npt.NDArray[np.bool_], lower: Array, upper: Array
 ) -> npt.NDArray[np.bool_]:
     """Which speed profiles (P,) enter a box (N, K) at a time at which they overlap it sideways."""
-    obstacle, k = (overlap & (lower < speeds.most) & (upper > speeds.least)).nonzero()
-    s = speeds.s.take(k, axis=1)
-    inside = (s > lower[obstacle, k]) & (s < upper[obstacle, k])
-    return np.asarray(inside.any(axis=1))
+    met = (overlap & (lower < speeds.most) & (upper > speeds.least)).nonzero()
+    s = speeds.s.take(met[1], axis=0)
+    within = s > lower[met][:, None]
+    within &= s < upper[met][:, None]
+    return np.asarray(np.logical_or.reduce(within, axis=0))
 
 
 def _closest(
@@ -309,10 +403,11 @@ def _closest(
     for profile, maneuver, members in shut:
         if profile.maneuver not in wanted:
             continue
-        overlap = (lower[..., 1] < profile.l) & (profile.l < upper[..., 1])
+        overlap = overlapping(lower, upper, profile.l)
         met = overlap.any(axis=1)
-        inside = np.minimum(speeds.s[:, None] - lower[met, :, 0], upper[met, :, 0] - speeds.s[:, None])
-        depth = np.where(overlap[met], inside, 0.0).max(axis=(1, 2), initial=0.0)
+        s = speeds.s.T[:, None]
+        within = np.minimum(s - lower[met, :, 0], upper[met, :, 0] - s)
+        depth = np.where(overlap[met], within, 0.0).max(axis=(1, 2), initial=0.0)
         badness = np.where(members, 10.0 * depth + excess, np.inf)
         p = int(np.argmin(badness))
         if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
@@ -327,13 +422,15 @@ def _kinds(
     overlap: npt.NDArray[np.bool_],
     upper: Array,
     speeds: _Rollouts,
-) -> dict[Maneuver, npt.NDArray[np.bool_]]:
+) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_]], ...]:
     """Which speed profiles (P,) count as which manoeuvre."""
-    if profile.maneuver is not None or conflict is None or not overlap[conflict[1]].any():
-        return {profile.maneuver or Maneuver.YIELD: np.ones(len(speeds.s), dtype=bool)}
-    j = conflict[1]
-    passed = ((speeds.s > upper[j, :, 0]) & overlap[j]).any(axis=1)
-    return {Maneuver.YIELD: ~passed, Maneuver.GO_AHEAD: passed}
+    if profile.maneuver is None and conflict is not None:
+        k = overlap[conflict[1]].nonzero()[0]
+        if len(k):
+            beyond = speeds.s.take(k, axis=0) > upper[conflict[1], k, 0][:, None]
+            passed = np.logical_or.reduce(beyond, axis=0)
+            return (Maneuver.YIELD, ~passed), (Maneuver.GO_AHEAD, passed)
+    return ((profile.maneuver or Maneuver.YIELD, np.ones(len(speeds.cost), dtype=bool)),)
 
 
 def _passing(
@@ -347,9 +444,8 @@ def _passing(
     upper: Array,
 ) -> Passing:
     columns = np.zeros((4, len(times), 2))
-    columns[0, :, 0], columns[0, :, 1] = speeds.s[p], profile.l
-    columns[1, :, 0], columns[1, :, 1] = speeds.v[p], profile.rate
-    columns[2, :, 0], columns[2, :, 1] = speeds.a[p], profile.acceleration
+    columns[0, :, 0], columns[1, :, 0], columns[2, :, 0] = speeds.motion(p)
+    columns[0, :, 1], columns[1, :, 1], columns[2, :, 1] = profile.l, profile.rate, profile.acceleration
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
     return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost)
@@ -362,9 +458,10 @@ def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8
     larger distance does. Where a box is not there it counts as ahead of the path.
     """
     before, after = lower - position, position - upper
-    along, across = np.maximum(before, after).transpose(2, 0, 1)
+    far = np.maximum(before, after)
+    along, across = far[..., 0], far[..., 1]
     ahead, left = after[..., 0] > before[..., 0], after[..., 1] >= before[..., 1]
     # in the order of Side: behind, ahead, left, right
     side = np.where(across > along, 3 - left.view(np.int8), ahead.view(np.int8))
-    side[~np.isfinite(along + across)] = int(Side.BEHIND)
+    side *= np.isfinite(along + across)  # to BEHIND, which is 0
     return side

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,10 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.config import Config, LimitsConfig
+from repair.grid import Grid
 from repair.kinematics import POSITION_TOLERANCE
-from repair.occupancy import relevant
-from repair.passing import open_passings
-from repair.types import Array, Curve, LateralBounds, Limits, Maneuver, Occupancy, RepairProblem, frozen
+from repair.occupancy import near, relevant
+from repair.passing import Surroundings, open_passings, surroundings
+from repair.types import (
+    Array,
+    Curve,
+    FrenetTrajectory,
+    LateralBounds,
+    Limits,
+    Maneuver,
+    Occupancy,
+    RepairProblem,
+    frozen,
+)
 
 if TYPE_CHECKING:
     from repair.scene.commonroad import Scene
@@ -24,6 +36,8 @@ __all__ = ["ProblemFactory", "resolve_limits"]
 # Share of the vehicle's friction circle that a repair may use where nothing else is configured:
 # the rest is left for what the kinematic model adds to the planned accelerations.
 _USABLE = 0.9
+# Where the lateral room is looked up, from the hindmost to the foremost place within reach.
+_SHARES = frozen(np.linspace(0.0, 1.0, 50))
 
 
 def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: float) -> Limits:
@@ -86,6 +100,10 @@ class ProblemFactory:
         return wide.get(self.config.repair.lateral, self.scene.lane)
 
     @cached_property
+    def _grid(self) -> Grid | None:
+        return Grid.over(self.occupancy, self.reference, self.t_end, self.scene.dt)
+
+    @cached_property
     def _axis(self) -> tuple[Array, Array]:
         s0 = float(self.scene.start[0, 0])
         s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
@@ -113,14 +131,12 @@ class ProblemFactory:
         step = self.scene.dt
         if t_rep > self.t_end - step + 1e-9:
             return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
-        count = int(np.ceil((self.t_end - t_rep) / step - 1e-6))
+        count = math.ceil((self.t_end - t_rep) / step - 1e-6)
         times = t_rep + step * np.arange(count + 1)
-        reference = self.reference.sample(times)
-        start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
-        occupancy = self._within_reach(start, t_rep, reference.position, lateral)
+        reference, start, occupancy, boxes = self._scenery(t_rep, times, margin, lateral)
         s, curvature = self._axis
         passings = open_passings(
-            reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature)
+            reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature), boxes
         )
         return tuple(
             RepairProblem(
@@ -145,16 +161,43 @@ class ProblemFactory:
             for passing in passings
         )
 
+    def _scenery(
+        self, t_rep: float, times: Array, margin: float, lateral: bool
+    ) -> tuple[FrenetTrajectory, Array, Occupancy, Surroundings]:
+        """Reference, state at t_rep, obstacles within reach, and where these meet the reference."""
+        grid = self._grid
+        first = None if grid is None else grid.index(t_rep)
+        if grid is None or first is None:
+            reference = self.reference.sample(times)
+            start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+            occupancy = self._within_reach(start, t_rep, reference.position, lateral)
+            return reference, start, occupancy, surroundings(reference, occupancy, margin)
+        reference, start = grid.trajectory(first, times), grid.states[first]
+        reach, room = self._reach(start, t_rep, grid.rightmost[first], grid.leftmost[first], lateral)
+        rows = near(self.occupancy, slice(first, grid.last), reach, room).nonzero()[0]
+        occupancy = self.occupancy.select(rows) if len(rows) < len(self.occupancy) else self.occupancy
+        return reference, start, occupancy, grid.surroundings(first, rows, occupancy, margin)
+
     def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:
+        sideways = reference[:, 1]
+        reach, room = self._reach(start, t_rep, float(sideways.min()), float(sideways.max()), lateral)
+        return relevant(self.occupancy, start, t_rep, self.t_end, np.array(reach), np.array(room))
+
+    def _reach(
+        self, start: Array, t_rep: float, rightmost: float, leftmost: float, lateral: bool
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Smallest and largest s, and l, that the ego can be at from a state on.
+
+        Parameters
+        ----------
+        rightmost, leftmost : float
+            Smallest and largest l of the reference from there on [m]: who may not move sideways keeps it.
+        """
         duration = self.t_end - t_rep
-        s0, v0 = start[0, 0], max(start[1, 0], 0.0)
-        ahead = s0 + v0 * duration + 0.5 * self.limits.a_max * duration**2
-        reach = np.array([s0 - 1.0, ahead + 1.0])
+        s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
+        behind, ahead = s0 - 1.0, s0 + v0 * duration + 0.5 * self.limits.a_max * duration**2 + 1.0
         if lateral:
-            right, left = self.bounds.at(np.linspace(reach[0], reach[1], 50))
-            room = np.array([right.min(), left.max()])
-        else:
-            room = np.array([reference[:, 1].min(), reference[:, 1].max()])
+            right, left = self.bounds.at(behind + (ahead - behind) * _SHARES)
+            rightmost, leftmost = float(right.min()), float(left.max())
         margin = self.config.repair.margin + self.config.repair.clearance
-        room += np.array([-margin, margin])
-        return relevant(self.occupancy, start, t_rep, self.t_end, reach, room)
+        return (behind, ahead), (rightmost - margin, leftmost + margin)

@@ -198,18 +198,22 @@ class Occupancy:
         return lower, upper
 
     @cached_property
-    def swept(self) -> tuple[Array, Array]:
-        """Corners (N, T - 1, 2) of what each box spans between two steps; NaN where it is at neither."""
-        return (
-            np.fmin(self.lower[:, :-1], self.lower[:, 1:]),
-            np.fmax(self.upper[:, :-1], self.upper[:, 1:]),
-        )
+    def swept(self) -> Array:
+        """What each box spans between two steps, ``[s_max, -s_min, l_max, -l_min]`` (4, N, T - 1).
+
+        NaN where the box is at neither step; where there is one step only, the box itself (4, N, 1).
+        The signs let one comparison tell what is near.
+        """
+        first, second = (slice(-1), slice(1, None)) if len(self.t) > 1 else (slice(None), slice(None))
+        lower = np.fmin(self.lower[:, first], self.lower[:, second])
+        upper = np.fmax(self.upper[:, first], self.upper[:, second])
+        return frozen([upper[..., 0], -lower[..., 0], upper[..., 1], -lower[..., 1]])
 
     def select(self, keep: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Occupancy:
         """The obstacles that ``keep`` names."""
-        rows = np.arange(len(self))[keep]
-        lower, upper = (box.take(rows, axis=0) for box in (self.lower, self.upper))
-        return Occupancy(self.t, self.ids[rows], lower, upper, self.static[rows])
+        rows = keep.nonzero()[0] if keep.dtype == np.bool_ else keep
+        lower, upper = self.lower.take(rows, axis=0), self.upper.take(rows, axis=0)
+        return Occupancy(self.t, self.ids.take(rows), lower, upper, self.static.take(rows))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -217,6 +221,9 @@ class Occupancy:
 
 class Maneuver(str, Enum):
     """What a repaired trajectory does about the conflict, named as people would."""
+
+    # That of Enum hashes the member's name, in Python, and differs from that of the equal string.
+    __hash__ = str.__hash__
 
     YIELD = "yield"
     GO_AHEAD = "go_ahead"

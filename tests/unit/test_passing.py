@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import toy
 
-from repair.passing import open_passings
+from repair.passing import _allowed, _speed_profiles, _surely_allowed, open_passings
 from repair.reference import SpeedProfile
 from repair.types import LateralBounds, Maneuver, Side, frozen
 
@@ -260,3 +260,25 @@ def test_every_open_guide_is_free_and_on_the_side_it_says(rows, v0, lateral, t_e
     assert found  # at least the way that comes closest
     if not lateral:
         assert found.keys() <= {Maneuver.YIELD, Maneuver.GO_AHEAD}
+
+
+@given(
+    st.floats(0.0, 25.0),
+    st.floats(-3.0, 3.0),
+    st.lists(st.floats(-0.2, 0.2), min_size=2, max_size=30),
+    st.integers(0, 43),
+)
+def test_the_quick_look_at_the_bends_allows_nothing_that_the_long_one_does_not(v0, a0, bends, p):
+    tau = toy.DT * np.arange(41)
+    speeds = _speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [a0, 0.0]]), tau, toy.LIMITS)
+    curvature = (np.linspace(-5.0, 60.0, len(bends)), np.array(bends))
+    if _surely_allowed(speeds, p, toy.LIMITS, curvature):
+        assert _allowed(speeds.motion(p), toy.LIMITS, curvature)
+
+
+@given(st.floats(0.0, 40.0))
+def test_all_profiles_lie_between_the_slowest_and_the_fastest(v0):
+    tau = toy.DT * np.arange(41)
+    speeds = _speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [0.0, 0.0]]), tau, toy.LIMITS)
+    assert (speeds.s >= speeds.least[:, None] - 1e-9).all()
+    assert (speeds.s <= speeds.most[:, None] + 1e-9).all()
