@@ -166,7 +166,7 @@ class Checker:
             found += self._margin(problem, curve, after)
         found += self._clear(path.t, path.xy, orientation, first)
         # What is rejected already is not worth the drivability checker's time.
-        return Verdict(tuple(found or self._kinematics(self._at_steps(path, slip, orientation))))
+        return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
@@ -175,7 +175,7 @@ class Checker:
             return _NOT_FINITE
         found = self._clear(path.t, path.xy, orientation, 0)
         until = min((violation.time for violation in found), default=float("inf"))
-        return Verdict(tuple(found + self._kinematics(self._at_steps(path, slip, orientation), until)))
+        return Verdict(tuple(found + self._kinematics(path, slip, orientation, until)))
 
     def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array]:
         """Path, slip angle and orientation along the reference, which is kept for the repairs."""
@@ -204,13 +204,6 @@ class Checker:
         velocity = np.concatenate((kept.velocity[first:late], after.velocity))
         path = frame.carry(times[first:], position, velocity)
         return path, None if first == 0 else float(kept.slip[first])
-
-    def _at_steps(self, path: CartesianPath, slip: Array, orientation: Array) -> DrivenStates:
-        """States at the scenario's steps, of a path that begins at one."""
-        n = self.config.substeps
-        return driven_states(
-            path.t[::n], path.xy[::n], path.speed[::n], slip[::n], orientation[::n], self.scene.vehicle
-        )
 
     def _clear(self, t: Array, xy: Array, orientation: Array, first_sample: int) -> list[Violation]:
         """First contact with an obstacle and first departure from the road."""
@@ -275,16 +268,27 @@ class Checker:
         broken = [text.format(value) for bad, text, value in checks if bad]
         return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
 
-    def _kinematics(self, states: DrivenStates, until: float = float("inf")) -> list[Violation]:
-        """Direct check first; the drivability checker decides what is left before ``until``."""
-        scene, official = self.scene, self.config.official
-        if len(states) < 2 or (official != "always" and clearly_drivable(states, scene.dt, scene.vehicle)):
+    def _kinematics(
+        self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
+    ) -> list[Violation]:
+        """Direct check first; the drivability checker decides what is left before ``until``.
+
+        Judged are the scenario's steps of a path that begins at one.
+        """
+        dt, vehicle, official, n = (
+            self.scene.dt, self.scene.vehicle, self.config.official, self.config.substeps,
+        )  # fmt: skip
+        xy, speed, slip, orientation = path.xy[::n], path.speed[::n], slip[::n], orientation[::n]
+        if len(xy) < 2:
             return []
-        report = direct_check(states, scene.dt, scene.vehicle)
+        if official != "always" and clearly_drivable(xy, speed, slip, orientation, dt, vehicle):
+            return []
+        states = driven_states(path.t[::n], xy, speed, slip, orientation, vehicle)
+        report = direct_check(states, dt, vehicle)
         open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
         open_ = open_[states.t[open_] < until]
         for k in open_.tolist():
-            if official == "never" or not official_check(states, scene.dt, scene.vehicle, [k]).ok.all():
+            if official == "never" or not official_check(states, dt, vehicle, [k]).ok.all():
                 return [Violation(Reason.KINEMATICS, float(states.t[k]), report.limit(k))]
         return []
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from repair import kinematics
 from repair.collision import CollisionWorld, RoadBoundary, _grouping
-from repair.kinematics import DrivenStates, clearly_drivable, direct_check, drive
+from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
 
@@ -138,7 +139,8 @@ def ride(rng, vehicle, dt):
     xy = np.cumsum(np.column_stack((np.cos(heading), np.sin(heading))) * step[:, None], axis=0)
     xy += rng.choice([0.0, 0.0, 0.0, 4990.0, 1e6]) + rng.normal(0, rng.choice([0.0, 0.0, 0.003]), (n, 2))
     distance = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))))
-    return drive(np.arange(n) * dt, xy, heading, speed, distance, vehicle)
+    slip, orientation = body_angles(heading, speed, distance, vehicle)
+    return xy, speed, slip, orientation
 
 
 @settings(max_examples=500, derandomize=True, deadline=None)
@@ -146,16 +148,37 @@ def ride(rng, vehicle, dt):
 def test_clearly_drivable_is_drivable_step_by_step(seed, type_id):
     rng = np.random.default_rng(seed)
     vehicle, dt = load_vehicle(type_id), float(rng.choice([0.04, 0.1, 0.2]))
-    states = ride(rng, vehicle, dt)
-    if clearly_drivable(states, dt, vehicle):
+    motion = ride(rng, vehicle, dt)
+    if clearly_drivable(*motion, dt, vehicle):
+        states = driven_states(np.arange(len(motion[0])) * dt, *motion, vehicle)
         assert direct_check(states, dt, vehicle).ok.all()
 
 
-@pytest.mark.parametrize("name", ["x", "y", "steering", "speed", "orientation"])
-def test_what_is_not_a_number_is_not_clearly_drivable(name):
+@pytest.mark.parametrize("errors", ["shift", "turn"])
+def test_the_bounds_of_clearly_drivable_hold_for_the_errors(errors, monkeypatch):
+    """With one tolerance cut down to a drive's own error, that drive must not pass."""
+    name = "POSITION_TOLERANCE" if errors == "shift" else "ORIENTATION_TOLERANCE"
+    share = 0.5 if errors == "shift" else 0.4
+    rng, asked = np.random.default_rng(3), 0
+    for _ in range(3000):
+        with monkeypatch.context() as patch:
+            motion = ride(rng, EGO, 0.1)
+            if not clearly_drivable(*motion, 0.1, EGO):
+                continue
+            states = driven_states(np.arange(len(motion[0])) * 0.1, *motion, EGO)
+            error = float(np.max(_errors(states, 0.1, EGO)[errors == "turn"]))
+            patch.setattr(kinematics, name, error / share * (1.0 - 1e-6))
+            asked += error > 1e-6
+            assert error <= 1e-9 or not clearly_drivable(*motion, 0.1, EGO)
+    assert asked > 100
+
+
+@pytest.mark.parametrize("column", range(5))
+def test_what_is_not_a_number_is_not_clearly_drivable(column):
     t = np.arange(9) * 0.1
-    columns = {"x": 10.0 * t, "y": 0 * t, "steering": 0 * t, "speed": 0 * t + 10.0, "orientation": 0 * t}
-    assert clearly_drivable(DrivenStates(t, **columns), 0.1, EGO)
+    rows = np.array((10.0 * t, 0 * t, 0 * t + 10.0, 0 * t, 0 * t))
+    assert clearly_drivable(rows[:2].T, *rows[2:], 0.1, EGO)
     for k in range(9):
-        broken = columns | {name: np.where(np.arange(9) == k, np.nan, columns[name])}
-        assert not clearly_drivable(DrivenStates(t, **broken), 0.1, EGO)
+        rows[column, k], kept = np.nan, rows[column, k]
+        assert not clearly_drivable(rows[:2].T, *rows[2:], 0.1, EGO)
+        rows[column, k] = kept
