@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from repair import kinematics
-from repair.collision import CollisionWorld, RoadBoundary, _grouping
+from repair.collision import CollisionWorld
 from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
+from repair.road import RoadBoundary, RoadCorridor, _grouping
+from repair.scene.frame import FrenetFrame
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
 
@@ -82,6 +84,49 @@ def test_poses_that_are_nowhere_are_off_the_road(bad):
         poses[0] = np.linspace(0.0, 5.0, 20)
         poses[column, 7] = bad
         assert road.first_off_road(*poses) == 7
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_corridor_holds_only_what_is_on_the_road(seed):
+    rng = np.random.default_rng(seed)
+    road = ragged_road(rng)
+    along = np.linspace(-30.0, 95.0, 60)
+    bends = rng.uniform(0, 4) * np.sin(along / rng.uniform(8, 40) + rng.uniform(0, 6))
+    frame = FrenetFrame.from_points(np.column_stack((along, bends)))
+    corridor = RoadCorridor(road, frame, EGO)
+    s, l = rng.uniform(-5, frame.length + 5, 400), rng.normal(0, 2, 400)  # noqa: E741
+    xy = frame.to_cartesian(s, l)
+    orientation = frame.heading(s) + rng.normal(0, rng.choice([0.0, 0.1, 1.0]), 400)
+    s = s + rng.choice([0.0, 0.0, 1.0, 200.0], 400)  # a wrong cell may only say that it does not know
+    held = corridor.holds(s, np.ascontiguousarray(xy).view(np.complex128)[:, 0], orientation)
+    assert road._inside(road._outline(*xy.T, orientation))[held].all()
+
+
+def test_the_corridor_holds_nearly_up_to_the_edge():
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -0.5))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    corridor = RoadCorridor(road, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    s = np.linspace(0.0, 60.0, 161)
+    for y, held in ((4.9, True), (5.1, False), (-2.4, True), (-2.6, False)):
+        centre = s + 1j * (y - np.sign(y) * 0.5 * EGO.width)
+        assert corridor.holds(s, centre, np.zeros(161)).all() == held
+        assert corridor.holds(s, centre, np.zeros(161)).any() == held
+
+
+def test_the_corridor_does_not_hold_what_is_nowhere():
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -1))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    corridor = RoadCorridor(road, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    for place in (complex(np.nan, 0.0), complex(3.0, np.nan), 1e300 + 0j):
+        assert not corridor.holds(np.array([3.0]), np.array([place]), np.zeros(1)).any()
+    for angle in (np.nan, np.inf, 1e300):
+        assert not corridor.holds(np.array([3.0]), np.array([3.0 + 0j]), np.array([angle])).any()
+    nowhere = RoadBoundary(SimpleNamespace(lanelet_network=SimpleNamespace(lanelets=[])), EGO)
+    corridor = RoadCorridor(nowhere, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    assert not corridor.holds(np.array([3.0]), np.array([3.0 + 0j]), np.zeros(1)).any()
 
 
 # -------------------------------------------------------------------- contact
