@@ -8,6 +8,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -98,7 +99,7 @@ class CollisionWorld:
         self.substeps = substeps
         self.n_samples = n_steps * substeps + 1
         self._obstacles = tuple(obstacles)
-        self._half = (0.5 * vehicle.length, 0.5 * vehicle.width)
+        self._half = np.array((0.5 * vehicle.length, 0.5 * vehicle.width))
         sample = np.arange(self.n_samples)
         self._before = sample // substeps
         self._after = -(-sample // substeps)
@@ -143,7 +144,7 @@ class CollisionWorld:
         # Points and directions of the plane as complex numbers: one call where coordinates take two.
         self._centre = _complex(x, y)
         self._axis = _complex(np.cos(heading), np.sin(heading))
-        self._size = np.array(size)
+        self._size = np.stack(size, axis=2).reshape(-1, 2)  # (samples * tracks, 2)
         radius = np.where(self._kind == _RECTANGLE, np.hypot(*size), size[0])
         self._round = bool((self._kind != _RECTANGLE).any())
         self._build_blocks(radius + ego_radius)
@@ -161,7 +162,6 @@ class CollisionWorld:
         away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
         self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
         self._block_samples = np.arange(count * size).reshape(count, size)
-        self._block_middle = self._block_samples[:, size // 2].copy()
 
     def _interpolate(self, rows: Array) -> Array:
         """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
@@ -231,28 +231,33 @@ class CollisionWorld:
 
     def _first(self, x: Array, y: Array, orientation: Array, start: int) -> tuple[int, int] | None:
         """Sample (counted from ``start``) and obstacle index of the first collision."""
-        rows = slice(start, start + len(x))
-        if start < 0 or rows.stop > self.n_samples:
-            raise ValueError(f"samples {start} to {rows.stop} of a world of {self.n_samples}")
-        if not np.isfinite(np.array((x, y, orientation))).all():
-            raise ValueError("the ego's poses are not finite")
+        stop = start + len(x)
+        if start < 0 or stop > self.n_samples:
+            raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
         here = _complex(x, y)
+        # A sum is cheaper than a look at each, and finite only if they are.
+        if not np.isfinite(np.add.reduce(here) + np.add.reduce(orientation)) and not (
+            np.isfinite(here).all() and np.isfinite(orientation).all()
+        ):
+            raise ValueError("the ego's poses are not finite")
         k, m = self._near(here, start)
         if not len(k):
             return None
-        ego = k - start
-        turned = orientation[ego]
+        ego, row = k - start, k * len(self._kind) + m
+        turned = orientation.take(ego)
         axis = _complex(np.cos(turned), -np.sin(turned))
-        seen, size = (self._centre[k, m] - here[ego]) * axis, self._size[:, k, m]
-        hit = _rectangles_touch(seen, self._axis[k, m] * axis, self._half, size)
+        seen, size = (self._centre.take(row) - here.take(ego)) * axis, self._size.take(row, axis=0)
+        hit = _rectangles_touch(seen, self._axis.take(row) * axis, self._half, size)
         if self._round:
             beyond = np.hypot(
                 np.maximum(np.abs(seen.real) - self._half[0], 0.0),
                 np.maximum(np.abs(seen.imag) - self._half[1], 0.0),
             )
-            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[0] + _TOUCH)
+            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[:, 0] + _TOUCH)
+        if not hit.any():
+            return None
         hits = np.flatnonzero(hit)
-        for i in hits[np.lexsort((m[hits], k[hits]))].tolist() if len(hits) else ():
+        for i in hits[np.lexsort((m[hits], k[hits]))].tolist():
             pose = (x[ego[i]], y[ego[i]], axis[i].real, -axis[i].imag)
             if self._kind[m[i]] != _POLYGON or self._polygons_touch(int(k[i]), int(m[i]), pose):
                 return int(ego[i]), int(self._owner[m[i]])
@@ -263,9 +268,8 @@ class CollisionWorld:
         size, stop = self._block, start + len(here)
         blocks = slice(start // size, -(-stop // size))
         # Within a block no sample is farther than half a block from the one that is looked at.
-        at = np.minimum(np.maximum(self._block_middle[blocks] - start, 0), len(here) - 1)
         step = float(np.maximum.reduce(np.abs(here[1:] - here[:-1]), initial=0.0))
-        offset = self._block_centre[blocks] - here[at, None]
+        offset = self._block_centre[blocks] - here.take(_looked_at(start, stop, size))
         near = np.abs(offset) <= self._block_reach[blocks] + size // 2 * step
         block, track = near.nonzero()
         if not len(block):
@@ -304,6 +308,15 @@ def _rows(obstacle: Obstacle) -> tuple[int, Array]:
     return _POLYGON, rows
 
 
+@lru_cache(maxsize=256)
+def _looked_at(start: int, stop: int, size: int) -> Index:
+    """Of each block of ``size`` samples that meets [start, stop), its middle, (n, 1) from ``start`` on."""
+    middle = np.arange(start // size, -(-stop // size)) * size + size // 2
+    looked_at = np.clip(middle - start, 0, max(stop - start - 1, 0))[:, None]
+    looked_at.setflags(write=False)
+    return looked_at
+
+
 def _complex(x: Array, y: Array) -> Points:
     """Points (or directions) of the plane as x + iy."""
     made = np.empty(x.shape, dtype=np.complex128)
@@ -313,32 +326,29 @@ def _complex(x: Array, y: Array) -> Points:
 
 
 def _parts(points: Points) -> Array:
-    """Real and imaginary part, without their signs, (2, n)."""
-    parts: Array = np.abs(np.array((points.real, points.imag)))
+    """Real and imaginary part, without their signs, (n, 2)."""
+    parts: Array = np.abs(points.view(np.float64).reshape(-1, 2))
     return parts
 
 
-def _rectangles_touch(
-    offset: Points, turn: Points, half: tuple[float, float], size: Array
-) -> npt.NDArray[np.bool_]:
+def _rectangles_touch(offset: Points, turn: Points, half: Array, size: Array) -> npt.NDArray[np.bool_]:
     """Whether the ego and rectangles meet: separating axes.
 
     ``offset`` and ``turn`` (n,) give the other rectangle's centre and direction seen from the ego,
-    ``size`` (2, n) its half length and width.
+    ``size`` (n, 2) its half length and width.
     """
     along = _parts(turn)
-    across = along[::-1]
-    from_ego = size[0] * along + size[1] * across + np.array([[half[0] + _TOUCH], [half[1] + _TOUCH]])
-    hit = np.logical_and.reduce(_parts(offset) <= from_ego, axis=0)
+    across = along[:, ::-1]
+    meets = _parts(offset) <= size[:, :1] * along + size[:, 1:] * across + (half + _TOUCH)
+    hit = meets[:, 0] & meets[:, 1]
     if hit.any():  # mostly one of the ego's own axes tells the two apart
-        from_other = half[0] * along + half[1] * across + size + _TOUCH
-        hit &= np.logical_and.reduce(_parts(offset * turn.conj()) <= from_other, axis=0)
-    return np.asarray(hit)
+        meets = _parts(offset * turn.conj()) <= half[0] * along + half[1] * across + (size + _TOUCH)
+        hit &= meets[:, 0]
+        hit &= meets[:, 1]
+    return hit
 
 
-def _polygon_touches(
-    polygon: Array, pose: tuple[float, float, float, float], half: tuple[float, float]
-) -> bool:
+def _polygon_touches(polygon: Array, pose: tuple[float, float, float, float], half: Array) -> bool:
     """Whether the ego at ``x, y, cos, sin`` meets a convex polygon (V, 2): separating axes."""
     x, y, cos, sin = pose
     points = (polygon - (x, y)) @ np.array([[cos, -sin], [sin, cos]])  # seen from the ego
