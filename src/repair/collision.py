@@ -7,6 +7,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -236,7 +237,7 @@ class CollisionWorld:
             raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
         here = _complex(x, y)
         # A sum is cheaper than a look at each, and finite only if they are.
-        if not np.isfinite(np.add.reduce(here) + np.add.reduce(orientation)) and not (
+        if not cmath.isfinite(np.add.reduce(here) + np.add.reduce(orientation)) and not (
             np.isfinite(here).all() and np.isfinite(orientation).all()
         ):
             raise ValueError("the ego's poses are not finite")

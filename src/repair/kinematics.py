@@ -63,6 +63,8 @@ _ACCEPT = np.array(_ACCEPT_LIST)[:, None]
 _ENGINE = 0.45
 # clearly_drivable stays this much below a limit, so that rounding cannot make it laxer.
 _SURE = 1.0 - 1e-9
+# Samples at least this far apart [m] are those of a moving vehicle.
+_MOVES = 1e-9
 # The official integrator's error is relative to the coordinates; far from the origin [m] it hides the
 # cost's slope from the optimiser.
 _FAR = 5000.0
@@ -192,15 +194,16 @@ def body_angles(
     """Slip angle and orientation (K,) [rad] along a path; arguments and rules as in :func:`drive`."""
     step = distance[1:] - distance[:-1]
     turn = heading[1:] - heading[:-1]
-    moving = step > 1e-9
-    if moving.all():
+    if np.minimum.reduce(step, initial=np.inf) > _MOVES:
         if not np.minimum.reduce(speed) > 0.0:
             step = np.copysign(step, speed[1:] + speed[:-1])
-        slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+        slip = _slip_angle(turn, step, step, vehicle.rear, slip0)
         return slip, heading - slip
+    moving = step > _MOVES
     step = np.where(moving, np.copysign(step, speed[1:] + speed[:-1]), 0.0)
     turn = np.where(moving, turn, 0.0)
-    slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+    # Where nothing moves, nothing turns: a length of 1 there only avoids the division by zero.
+    slip = _slip_angle(turn, step, np.where(moving, step, 1.0), vehicle.rear, slip0)
     return slip, heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
 
 
@@ -212,25 +215,23 @@ def driven_states(
     return DrivenStates(t, xy[:, 0], xy[:, 1], steering, speed * np.cos(slip), orientation)
 
 
-def _slip_angle(
-    turn: Array, step: Array, moving: npt.NDArray[np.bool_], rear: float, slip0: float | None
-) -> Array:
+def _slip_angle(turn: Array, step: Array, length: Array, rear: float, slip0: float | None) -> Array:
     """Integrate d(beta)/d(sigma) = d(theta)/d(sigma) - sin(beta)/b over the samples.
 
-    Each interval is split: half of the turn, then a straight piece, then the other half. On a straight
-    piece the rear axle draws a tractrix, tan(beta/2) shrinking by exp(-step/b) exactly; the turn is
-    scaled so that the small-angle solution at constant curvature is exact as well. In tan(beta/2) a
-    rotation is a Möbius map, so that the recurrence needs no trigonometric function.
+    ``length`` is ``step`` but for intervals on which nothing moves, and not 0 there. Each interval is
+    split: half of the turn, then a straight piece, then the other half. On a straight piece the rear
+    axle draws a tractrix, tan(beta/2) shrinking by exp(-step/b) exactly; the turn is scaled so that the
+    small-angle solution at constant curvature is exact as well. In tan(beta/2) a rotation is a Möbius
+    map, so that the recurrence needs no trigonometric function.
     """
     if slip0 is None:
-        first = int(np.argmax(moving)) if moving.any() else -1
-        bend = float(rear * turn[first] / step[first]) if first >= 0 else 0.0
+        first = int(np.argmax(step != 0.0)) if len(step) else -1
+        bend = float(rear * turn[first] / length[first]) if first >= 0 else 0.0
         slip0 = float(np.arcsin(min(max(bend, -0.95), 0.95)))
     if not len(step):
         return np.array([slip0])
     ratio = step * (0.5 / rear)
-    # Where nothing moves, nothing turns: a ratio of 1 there only avoids the division by zero.
-    half = 0.5 * turn * np.tanh(ratio) / (ratio + ~moving)
+    half = rear * turn * np.tanh(ratio) / length
     rotation = half.copy()
     rotation[1:] += half[:-1]
     value = float(np.tan(0.5 * slip0))

@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from repair import kinematics
+from repair.checker import Checker
 from repair.collision import CollisionWorld
 from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
+from repair.metrics import peaks
 from repair.road import RoadBoundary, RoadCorridor, _grouping
-from repair.scene.frame import FrenetFrame
+from repair.scene.frame import CartesianPath, FrenetFrame
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
 
@@ -169,6 +171,46 @@ def test_looking_at_blocks_drops_no_contact(seed):
     k, m = np.indices((len(x), len(world._kind))).reshape(2, -1)
     world._near = lambda here, start: (k + start, m)
     assert world._first(x, y, heading, start) == found
+
+
+# --------------------------------------------------------------------- limits
+
+
+@settings(max_examples=500, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_what_is_well_within_the_limits_breaks_none(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 40))
+    speed = rng.uniform(-1, 12) + np.cumsum(rng.normal(0, rng.choice([0.0, 0.01, 0.1]), n))
+    heading = np.cumsum(rng.normal(0, rng.choice([0.0, 0.001, 0.01]), n))
+    path = CartesianPath(0.025 * np.arange(n), np.zeros((n, 2)), heading, speed, np.zeros(n))
+    late = int(rng.integers(0, n))
+    reached = peaks(path, slice(late, None))
+    share = rng.uniform(0.95, 1.3, 5)  # the limits are near to what is reached
+    limits = SimpleNamespace(
+        v_max=share[0] * abs(reached.max_speed),
+        a_min=min(-1e-3, share[1] * reached.min_acceleration),
+        a_max=max(1e-3, share[2] * reached.max_acceleration),
+        a_lat=max(1e-3, share[3] * reached.max_lateral_acceleration),
+        a_total=max(1e-3, share[4] * reached.max_total_acceleration),
+    )
+    checker = Checker.__new__(Checker)
+    checker.limits = limits
+    if checker._well_within_limits(path, late):
+        checker._well_within_limits = lambda path, late: False
+        assert checker._limits(path, late, 0.0) == []
+
+
+def test_gentle_driving_is_well_within_the_limits():
+    t = 0.025 * np.arange(80)
+    path = CartesianPath(t, np.zeros((80, 2)), 0.05 * t, 10.0 - t, 10.0 * t)
+    checker = Checker.__new__(Checker)
+    checker.limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
+    assert checker._well_within_limits(path, 0)
+    assert checker._well_within_limits(path, 30)
+    for bad in (np.nan, 30.0):
+        path.speed[40] = bad
+        assert not checker._well_within_limits(path, 30)
 
 
 # ----------------------------------------------------------------- kinematics
