@@ -342,23 +342,45 @@ def clearly_drivable(
         and math.hypot(dv / dt, fastest * turn / vehicle.rear) <= _SURE * friction * vehicle.a_max
     ):
         return False
-    # What Simpson's rule and the trapezoidal one differ by, at most: each term is the second difference
-    # of a factor (tangent in the middle of a step, products of two changes) or follows from one.
-    steep = steepest * to_steering
-    bow = 0.25 * (dtangent * to_steering) ** 2 * steep * (1.0 + steep * steep) / to_steering
-    turned = (0.5 * dt / vehicle.rear) * (turning[1:] + turning[:-1])
-    off = float(np.maximum.reduce(np.abs(change[3] - turned)))
-    off += dt / vehicle.rear * (dv * dtangent / 6.0 + fastest * bow / 1.5)
-    if not off <= _SURE * angle * ORIENTATION_TOLERANCE:
-        return False
-    direction = np.exp(1j * psi)
     centre = np.ascontiguousarray(xy).view(np.complex128)[:, 0]
-    axle, way = centre - vehicle.rear * direction, (0.5 * dt) * v * direction
+    largest = (fastest, steepest, dv, dtangent, dturning, dpsi)
+    shift, turned = _error_bounds(centre, v, turning, psi, largest, dt, vehicle)
+    return (
+        turned <= _SURE * angle * ORIENTATION_TOLERANCE
+        and shift <= _SURE * position * POSITION_TOLERANCE
+        and float(np.maximum.reduce(np.abs(centre.view(np.float64)))) <= _FAR
+    )
+
+
+def _error_bounds(
+    centre: npt.NDArray[np.complexfloating[Any, Any]],
+    v: Array,
+    turning: Array,
+    psi: Array,
+    largest: tuple[float, float, float, float, float, float],
+    dt: float,
+    vehicle: Vehicle,
+) -> tuple[float, float]:
+    """Bounds of what :func:`_errors` gives: of the position and of the orientation.
+
+    The trapezoidal rule stands in for Simpson's. What the two differ by, at most, is added: each term
+    is half a step's second difference of a factor, a product of two changes, or follows from these.
+    ``largest`` holds the speed, the tangent of the slip angle and the changes of ``v``, of that tangent,
+    of ``turning`` (the product of the two) and of ``psi``, which are largest in size.
+    """
+    fastest, steepest, dv, dtangent, dturning, dpsi = largest
+    rear, to_steering = vehicle.rear, vehicle.wheelbase / vehicle.rear
+    steep, dsteep = steepest * to_steering, dtangent * to_steering
+    # between two steering angles, the tangent in the middle and the mean of the tangents
+    bow = 0.25 * dsteep * dsteep * steep * (1.0 + steep * steep) / to_steering
+    off = np.abs(psi[1:] - psi[:-1] - (0.5 * dt / rear) * (turning[1:] + turning[:-1]))
+    turned = float(np.maximum.reduce(off)) + dt / rear * (dv * dtangent / 6.0 + fastest * bow / 1.5)
+    direction = np.exp(1j * psi)
+    axle, way = centre - rear * direction, (0.5 * dt) * v * direction
     missed = np.abs((axle[1:] - axle[:-1] - way[1:] - way[:-1]).view(np.float64))
-    spread = off / 2.0 + dt * dturning / (12.0 * vehicle.rear) + dpsi * dpsi / 12.0
-    shift = float(np.maximum.reduce(missed)) + dt * (dv * dpsi / 6.0 + fastest * spread)
-    far = float(np.maximum.reduce(np.abs(centre.view(np.float64))))
-    return shift <= _SURE * position * POSITION_TOLERANCE and far <= _FAR
+    # directions at the end and in the middle of a step: those simulated and those used here
+    spread = 0.5 * turned + dt * dturning / (12.0 * rear) + dpsi * dpsi / 12.0
+    return float(np.maximum.reduce(missed)) + dt * (dv * dpsi / 6.0 + fastest * spread), turned
 
 
 def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:
