@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from repair.collision import CollisionWorld, Contact, RoadBoundary, official_shifts
+from repair.collision import CollisionWorld, Contact, official_shifts
 from repair.config import CheckerConfig
 from repair.kinematics import (
     DrivenStates,
@@ -26,6 +26,7 @@ from repair.kinematics import (
 )
 from repair.metrics import Peaks, peaks
 from repair.occupancy import first_entry
+from repair.road import Points, RoadBoundary, RoadCorridor
 from repair.types import (
     Array,
     Curve,
@@ -112,6 +113,7 @@ class Checker:
             official_shifts(scene.scenario),
         )  # fmt: skip
         self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
+        self._corridor = RoadCorridor(self.road, scene.frame, scene.vehicle) if self.road else None
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: _Followed | None = None
@@ -157,44 +159,45 @@ class Checker:
         first = max(math.floor(problem.t_rep / self.scene.dt + 1e-6) - 1, 0) * self.config.substeps
         times = self.times(problem.t_end)
         after = curve.sample(times[times.searchsorted(problem.t_rep - 1e-9) :])
-        path, slip0 = self._spliced(problem, after, times, first)
+        path, s, slip0 = self._spliced(problem, after, times, first)
         if not _finite(path):
             return _NOT_FINITE
         slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle, slip0)
         found = self._limits(path, len(path.t) - len(after), problem.t_rep) if self.config.limits else []
         if self.config.margin:
             found += self._margin(problem, curve, after)
-        found += self._clear(path.t, path.xy, orientation, first)
+        found += self._clear(path, s, orientation, first)
         # What is rejected already is not worth the drivability checker's time.
-        return Verdict(tuple(found or self._kinematics(self._at_steps(path, slip, orientation))))
+        return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
-        path, slip, orientation = self._follow(reference, t_end)
+        path, s, slip, orientation = self._follow(reference, t_end)
         if not _finite(path):
             return _NOT_FINITE
-        found = self._clear(path.t, path.xy, orientation, 0)
+        found = self._clear(path, s, orientation, 0)
         until = min((violation.time for violation in found), default=float("inf"))
-        return Verdict(tuple(found + self._kinematics(self._at_steps(path, slip, orientation), until)))
+        return Verdict(tuple(found + self._kinematics(path, slip, orientation, until)))
 
-    def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array]:
-        """Path, slip angle and orientation along the reference, which is kept for the repairs."""
+    def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
+        """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
         sampled = reference.sample(self.times(t_end))
         path = self.scene.frame.cartesian(sampled)
         slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle)
         self._followed = _Followed(reference, t_end, sampled.position, sampled.velocity, slip)
-        return path, slip, orientation
+        return path, sampled.position[:, 0], slip, orientation
 
     def _spliced(
         self, problem: RepairProblem, after: FrenetTrajectory, times: Array, first: int
-    ) -> tuple[CartesianPath, float | None]:
-        """The reference from dense sample ``first`` on, then ``after``; and the slip angle to begin with.
+    ) -> tuple[CartesianPath, Array, float | None]:
+        """The reference from dense sample ``first`` on, then ``after``.
 
-        At the start there is no history, and no slip angle (None).
+        Also the arc lengths, and the slip angle to begin with; at the start there is no history and no
+        slip angle (None).
         """
         frame, late = self.scene.frame, len(times) - len(after)
         if late == first == 0:
-            return frame.cartesian(after), None
+            return frame.cartesian(after), after.position[:, 0], None
         kept = self._followed
         if kept is None or kept.reference is not problem.reference or kept.t_end < problem.t_end:
             self._follow(problem.reference, problem.t_end)
@@ -203,29 +206,33 @@ class Checker:
         position = np.concatenate((kept.position[first:late], after.position))
         velocity = np.concatenate((kept.velocity[first:late], after.velocity))
         path = frame.carry(times[first:], position, velocity)
-        return path, None if first == 0 else float(kept.slip[first])
+        return path, position[:, 0], None if first == 0 else float(kept.slip[first])
 
-    def _at_steps(self, path: CartesianPath, slip: Array, orientation: Array) -> DrivenStates:
-        """States at the scenario's steps, of a path that begins at one."""
-        n = self.config.substeps
-        return driven_states(
-            path.t[::n], path.xy[::n], path.speed[::n], slip[::n], orientation[::n], self.scene.vehicle
-        )
-
-    def _clear(self, t: Array, xy: Array, orientation: Array, first_sample: int) -> list[Violation]:
+    def _clear(self, path: CartesianPath, s: Array, orientation: Array, first_sample: int) -> list[Violation]:
         """First contact with an obstacle and first departure from the road."""
         found = []
-        x, y = xy[:, 0], xy[:, 1]
-        contact = self.world.contact(x, y, orientation, first_sample)
+        centre = np.ascontiguousarray(path.xy).view(np.complex128)[:, 0]
+        contact = self.world.contact(centre.real, centre.imag, orientation, first_sample)
         if contact is not None:
             behind = " from behind" if contact.from_behind else ""
             detail = f"obstacle {contact.obstacle_id}{behind}"
             found.append(Violation(Reason.COLLISION, contact.time, detail))
-        if self.road is not None:
-            index = self.road.first_off_road(x, y, orientation)
-            if index is not None:
-                found.append(Violation(Reason.OFF_ROAD, float(t[index]), "the ego leaves the road"))
+        index = self._off_road(s, centre, orientation)
+        if index is not None:
+            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), "the ego leaves the road"))
         return found
+
+    def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
+        """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
+        if self.road is None or self._corridor is None:
+            return None
+        held = self._corridor.holds(s, centre, orientation)
+        if held.all():
+            return None
+        unsure = np.flatnonzero(~held)
+        left = centre[unsure]
+        index = self.road.first_off_road(left.real, left.imag, orientation[unsure])
+        return None if index is None else int(unsure[index])
 
     def _margin(self, problem: RepairProblem, curve: Curve, after: FrenetTrajectory) -> list[Violation]:
         """The paper's detectCollision on the repaired part, at the scenario's steps."""
@@ -258,8 +265,35 @@ class Checker:
         inside = (occupancy.lower[:, rows] < position) & (position < occupancy.upper[:, rows])
         return bool((inside[..., 0] & inside[..., 1]).any())
 
+    def _well_within_limits(self, path: CartesianPath, late: int) -> bool:
+        """Whether bounds of the peaks, which cost less than the peaks, meet the limits already.
+
+        No difference quotient is beyond the largest change of one sample to the next.
+        """
+        limits, since = self.limits, max(late - 1, 0)
+        if len(path.t) - since < 2:
+            return False
+        rows = np.array((path.speed[since:], path.heading[since:]))
+        change = rows[:, 1:] - rows[:, :-1]
+        rate = 1.0 / float(path.t[1] - path.t[0])
+        v_low, v_high = float(np.minimum.reduce(rows[0])), float(np.maximum.reduce(rows[0]))
+        (a_low, left), (a_high, right) = (
+            np.minimum.reduce(change, axis=1).tolist(), np.maximum.reduce(change, axis=1).tolist(),
+        )  # fmt: skip
+        lateral = max(-v_low, v_high) * max(-left, right)
+        return (
+            v_low >= -STANDSTILL
+            and v_high <= limits.v_max
+            and a_low * rate >= limits.a_min
+            and a_high * rate <= limits.a_max
+            and lateral * rate <= limits.a_lat
+            and math.hypot(max(-a_low, a_high), lateral) * rate <= limits.a_total
+        )
+
     def _limits(self, path: CartesianPath, late: int, t_rep: float) -> list[Violation]:
         """Limits that are broken from the path's sample ``late`` on."""
+        if self._well_within_limits(path, late):
+            return []
         limits, reached, more = self.limits, peaks(path, slice(late, None)), 1 + SLACK
         v_low, v_high = reached.min_speed, reached.max_speed
         a_low, a_high = reached.min_acceleration, reached.max_acceleration
@@ -275,16 +309,27 @@ class Checker:
         broken = [text.format(value) for bad, text, value in checks if bad]
         return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
 
-    def _kinematics(self, states: DrivenStates, until: float = float("inf")) -> list[Violation]:
-        """Direct check first; the drivability checker decides what is left before ``until``."""
-        scene, official = self.scene, self.config.official
-        if len(states) < 2 or (official != "always" and clearly_drivable(states, scene.dt, scene.vehicle)):
+    def _kinematics(
+        self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
+    ) -> list[Violation]:
+        """Direct check first; the drivability checker decides what is left before ``until``.
+
+        Judged are the scenario's steps of a path that begins at one.
+        """
+        dt, vehicle, official, n = (
+            self.scene.dt, self.scene.vehicle, self.config.official, self.config.substeps,
+        )  # fmt: skip
+        xy, speed, slip, orientation = path.xy[::n], path.speed[::n], slip[::n], orientation[::n]
+        if len(xy) < 2:
             return []
-        report = direct_check(states, scene.dt, scene.vehicle)
+        if official != "always" and clearly_drivable(xy, speed, slip, orientation, dt, vehicle):
+            return []
+        states = driven_states(path.t[::n], xy, speed, slip, orientation, vehicle)
+        report = direct_check(states, dt, vehicle)
         open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
         open_ = open_[states.t[open_] < until]
         for k in open_.tolist():
-            if official == "never" or not official_check(states, scene.dt, scene.vehicle, [k]).ok.all():
+            if official == "never" or not official_check(states, dt, vehicle, [k]).ok.all():
                 return [Violation(Reason.KINEMATICS, float(states.t[k]), report.limit(k))]
         return []
 

@@ -1,4 +1,4 @@
-"""Collision with obstacles and with the edge of the road, for the ego's oriented rectangle.
+"""Collision with obstacles, for the ego's oriented rectangle; the edge of the road is in ``road.py``.
 
 The verdicts are at least as strict as those of the drivability checker
 (``commonroad_dc.feasibility.solution_checker``), which looks at scenario steps only. The tests are
@@ -7,6 +7,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from repair.road import RoadBoundary
 from repair.types import Array
 
 if TYPE_CHECKING:
@@ -29,8 +31,6 @@ Index = npt.NDArray[np.intp]
 _TOUCH = 1e-6
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
-# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
-_BOX = 4.0
 
 
 class Contact(NamedTuple):
@@ -100,7 +100,7 @@ class CollisionWorld:
         self.substeps = substeps
         self.n_samples = n_steps * substeps + 1
         self._obstacles = tuple(obstacles)
-        self._half = (0.5 * vehicle.length, 0.5 * vehicle.width)
+        self._half = np.array((0.5 * vehicle.length, 0.5 * vehicle.width))
         sample = np.arange(self.n_samples)
         self._before = sample // substeps
         self._after = -(-sample // substeps)
@@ -145,7 +145,7 @@ class CollisionWorld:
         # Points and directions of the plane as complex numbers: one call where coordinates take two.
         self._centre = _complex(x, y)
         self._axis = _complex(np.cos(heading), np.sin(heading))
-        self._size = np.array(size)
+        self._size = np.stack(size, axis=2).reshape(-1, 2)  # (samples * tracks, 2)
         radius = np.where(self._kind == _RECTANGLE, np.hypot(*size), size[0])
         self._round = bool((self._kind != _RECTANGLE).any())
         self._build_blocks(radius + ego_radius)
@@ -163,7 +163,6 @@ class CollisionWorld:
         away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
         self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
         self._block_samples = np.arange(count * size).reshape(count, size)
-        self._block_middle = self._block_samples[:, size // 2].copy()
 
     def _interpolate(self, rows: Array) -> Array:
         """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
@@ -233,28 +232,33 @@ class CollisionWorld:
 
     def _first(self, x: Array, y: Array, orientation: Array, start: int) -> tuple[int, int] | None:
         """Sample (counted from ``start``) and obstacle index of the first collision."""
-        rows = slice(start, start + len(x))
-        if start < 0 or rows.stop > self.n_samples:
-            raise ValueError(f"samples {start} to {rows.stop} of a world of {self.n_samples}")
-        if not np.isfinite(np.array((x, y, orientation))).all():
-            raise ValueError("the ego's poses are not finite")
+        stop = start + len(x)
+        if start < 0 or stop > self.n_samples:
+            raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
         here = _complex(x, y)
+        # A sum is cheaper than a look at each, and finite only if they are.
+        if not cmath.isfinite(np.add.reduce(here) + np.add.reduce(orientation)) and not (
+            np.isfinite(here).all() and np.isfinite(orientation).all()
+        ):
+            raise ValueError("the ego's poses are not finite")
         k, m = self._near(here, start)
         if not len(k):
             return None
-        ego = k - start
-        turned = orientation[ego]
+        ego, row = k - start, k * len(self._kind) + m
+        turned = orientation.take(ego)
         axis = _complex(np.cos(turned), -np.sin(turned))
-        seen, size = (self._centre[k, m] - here[ego]) * axis, self._size[:, k, m]
-        hit = _rectangles_touch(seen, self._axis[k, m] * axis, self._half, size)
+        seen, size = (self._centre.take(row) - here.take(ego)) * axis, self._size.take(row, axis=0)
+        hit = _rectangles_touch(seen, self._axis.take(row) * axis, self._half, size)
         if self._round:
             beyond = np.hypot(
                 np.maximum(np.abs(seen.real) - self._half[0], 0.0),
                 np.maximum(np.abs(seen.imag) - self._half[1], 0.0),
             )
-            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[0] + _TOUCH)
+            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[:, 0] + _TOUCH)
+        if not hit.any():
+            return None
         hits = np.flatnonzero(hit)
-        for i in hits[np.lexsort((m[hits], k[hits]))].tolist() if len(hits) else ():
+        for i in hits[np.lexsort((m[hits], k[hits]))].tolist():
             pose = (x[ego[i]], y[ego[i]], axis[i].real, -axis[i].imag)
             if self._kind[m[i]] != _POLYGON or self._polygons_touch(int(k[i]), int(m[i]), pose):
                 return int(ego[i]), int(self._owner[m[i]])
@@ -265,9 +269,8 @@ class CollisionWorld:
         size, stop = self._block, start + len(here)
         blocks = slice(start // size, -(-stop // size))
         # Within a block no sample is farther than half a block from the one that is looked at.
-        at = np.minimum(np.maximum(self._block_middle[blocks] - start, 0), len(here) - 1)
         step = float(np.maximum.reduce(np.abs(here[1:] - here[:-1]), initial=0.0))
-        offset = self._block_centre[blocks] - here[at, None]
+        offset = self._block_centre[blocks] - here.take(_looked_at(start, stop, size))
         near = np.abs(offset) <= self._block_reach[blocks] + size // 2 * step
         block, track = near.nonzero()
         if not len(block):
@@ -306,6 +309,15 @@ def _rows(obstacle: Obstacle) -> tuple[int, Array]:
     return _POLYGON, rows
 
 
+@lru_cache(maxsize=256)
+def _looked_at(start: int, stop: int, size: int) -> Index:
+    """Of each block of ``size`` samples that meets [start, stop), its middle, (n, 1) from ``start`` on."""
+    middle = np.arange(start // size, -(-stop // size)) * size + size // 2
+    looked_at = np.clip(middle - start, 0, max(stop - start - 1, 0))[:, None]
+    looked_at.setflags(write=False)
+    return looked_at
+
+
 def _complex(x: Array, y: Array) -> Points:
     """Points (or directions) of the plane as x + iy."""
     made = np.empty(x.shape, dtype=np.complex128)
@@ -315,32 +327,29 @@ def _complex(x: Array, y: Array) -> Points:
 
 
 def _parts(points: Points) -> Array:
-    """Real and imaginary part, without their signs, (2, n)."""
-    parts: Array = np.abs(np.array((points.real, points.imag)))
+    """Real and imaginary part, without their signs, (n, 2)."""
+    parts: Array = np.abs(points.view(np.float64).reshape(-1, 2))
     return parts
 
 
-def _rectangles_touch(
-    offset: Points, turn: Points, half: tuple[float, float], size: Array
-) -> npt.NDArray[np.bool_]:
+def _rectangles_touch(offset: Points, turn: Points, half: Array, size: Array) -> npt.NDArray[np.bool_]:
     """Whether the ego and rectangles meet: separating axes.
 
     ``offset`` and ``turn`` (n,) give the other rectangle's centre and direction seen from the ego,
-    ``size`` (2, n) its half length and width.
+    ``size`` (n, 2) its half length and width.
     """
     along = _parts(turn)
-    across = along[::-1]
-    from_ego = size[0] * along + size[1] * across + np.array([[half[0] + _TOUCH], [half[1] + _TOUCH]])
-    hit = np.logical_and.reduce(_parts(offset) <= from_ego, axis=0)
+    across = along[:, ::-1]
+    meets = _parts(offset) <= size[:, :1] * along + size[:, 1:] * across + (half + _TOUCH)
+    hit = meets[:, 0] & meets[:, 1]
     if hit.any():  # mostly one of the ego's own axes tells the two apart
-        from_other = half[0] * along + half[1] * across + size + _TOUCH
-        hit &= np.logical_and.reduce(_parts(offset * turn.conj()) <= from_other, axis=0)
-    return np.asarray(hit)
+        meets = _parts(offset * turn.conj()) <= half[0] * along + half[1] * across + (size + _TOUCH)
+        hit &= meets[:, 0]
+        hit &= meets[:, 1]
+    return hit
 
 
-def _polygon_touches(
-    polygon: Array, pose: tuple[float, float, float, float], half: tuple[float, float]
-) -> bool:
+def _polygon_touches(polygon: Array, pose: tuple[float, float, float, float], half: Array) -> bool:
     """Whether the ego at ``x, y, cos, sin`` meets a convex polygon (V, 2): separating axes."""
     x, y, cos, sin = pose
     points = (polygon - (x, y)) @ np.array([[cos, -sin], [sin, cos]])  # seen from the ego
@@ -354,191 +363,3 @@ def _polygon_touches(
     projected = points @ normals.T
     reach = np.abs(normals) @ np.asarray(half) + _TOUCH
     return bool(((projected.min(axis=0) <= reach) & (projected.max(axis=0) >= -reach)).all())
-
-
-class RoadBoundary:
-    """The road as one region: the ego's rectangle must lie properly inside.
-
-    The region is the union of the lane sections, a section being a lanelet with all its lateral
-    neighbours; the drivability checker's triangulated boundary
-    (``solution_checker._construct_boundary_checker``) fills what is outside the same sections. That
-    triangulation needs the package ``triangle``, whose licence is not free; where it is installed,
-    :meth:`official_off_road` asks it as well.
-
-    Parameters
-    ----------
-    scenario : commonroad.scenario.scenario.Scenario
-        Only read.
-    vehicle : Vehicle
-        The ego.
-    """
-
-    def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
-        import shapely
-
-        self._scenario = scenario
-        self._corners = 0.5 * np.array(
-            [[vehicle.length, vehicle.width], [-vehicle.length, vehicle.width],
-             [-vehicle.length, -vehicle.width], [vehicle.length, -vehicle.width]]
-        )  # fmt: skip
-        outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
-        self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
-        shapely.prepare(self.region)
-        # More than the rounding of any coordinate of the region.
-        self._spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
-        self._triangles: Any = None
-
-    def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
-        """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
-
-        Parameters
-        ----------
-        x, y, orientation : (K,) array
-            Centre [m] and orientation [rad] of the ego.
-        """
-        known = self._surely_inside(x, y, orientation)
-        if known.all():
-            return None
-        unsure = np.flatnonzero(~known)
-        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
-        return None if inside.all() else int(unsure[np.argmin(inside)])
-
-    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
-        """Whether polygons (K, V, 2) lie properly inside of the region."""
-        import shapely
-
-        return np.asarray(shapely.contains_properly(self.region, shapely.polygons(outlines)))
-
-    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
-        """Poses (K,) that lie inside because a larger box does; False says nothing.
-
-        One box, turned like the pose in its middle, holds several consecutive poses: asking about
-        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
-        a pose turned by an angle t reaches farther, at most size * |t|.
-        """
-        count = len(x)
-        known = np.zeros(count, dtype=np.bool_)
-        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
-        if not np.isfinite(np.array((x, y, orientation))).all():
-            return known
-        size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
-        if size < 2:
-            return known
-        pose = _grouping(count, size)
-        middle = pose[size // 2]
-        centre = _complex(x, y)
-        heading, origin = orientation[middle], centre[middle]
-        axis = _complex(np.cos(heading), np.sin(heading))
-        seen = ((centre[pose] - origin) * axis.conj()).view(np.float64)
-        turn = np.maximum.reduce(np.abs(orientation[pose] - heading), axis=0)
-        half = self._corners[0] + self._spare + turn[:, None] * self._corners[0, ::-1]
-        sides = np.empty((len(middle), 4))
-        sides[:, :2] = np.minimum.reduce(seen, axis=0).reshape(-1, 2) - half
-        sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
-        corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
-        corners = corners * axis[:, None] + origin[:, None]
-        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
-        known[pose[:, inside] if not inside.all() else slice(None)] = True
-        return known
-
-    def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
-        """Whether the ego is off the road already at this pose."""
-        return self.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
-
-    def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
-        """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
-        cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
-        forward, left = self._corners[:, 0], self._corners[:, 1]
-        corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
-        return np.nan_to_num(np.stack(corners, axis=2), nan=1e12, posinf=1e12, neginf=-1e12)
-
-    def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
-        """As :meth:`first_off_road`, by the drivability checker's triangulation, built at the first call.
-
-        The two differ only next to ends of the map: the triangulation has no edge across the end of a
-        section that has successors, and a triangle may reach into the road there. None also where the
-        triangulation cannot be had (:attr:`official_available`).
-        """
-        if not self.official_available:
-            return None
-        import shapely
-
-        hits = self._triangles.query(
-            shapely.polygons(self._outline(x, y, orientation)), predicate="intersects"
-        )
-        return int(hits[0].min()) if hits.size else None
-
-    @property
-    def official_available(self) -> bool:
-        """Whether the checker can triangulate this road: it fails on some, or lacks ``triangle``."""
-        if self._triangles is None:
-            import shapely
-            from commonroad_dc.boundary import construction
-
-            try:
-                parts = construction.construct(self._scenario, ["section_triangles", "triangulation"])
-            except Exception:  # whatever goes wrong in there, there is no triangulation to ask
-                self._triangles = False
-            else:
-                # As plain geometry: pycrcc reports objects that live until the interpreter's exit as leaks.
-                corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
-                self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
-        return self._triangles is not False
-
-
-# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
-_MOST = 32
-_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
-
-
-@lru_cache(maxsize=256)
-def _grouping(count: int, size: int) -> npt.NDArray[np.intp]:
-    """Indices (size, G) of consecutive poses in groups; the last pose fills up the last group."""
-    groups = np.minimum(np.arange(-(-count // size) * size), count - 1).reshape(-1, size)
-    by_place = np.ascontiguousarray(groups.T)
-    by_place.setflags(write=False)
-    return by_place
-
-
-def _section_outlines(network: Any) -> list[Array]:
-    """Outline (V, 2) of every lane section: a lanelet with its lateral neighbours, right to left."""
-    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
-    left_over = dict.fromkeys(lanelets)
-    outlines = []
-    while left_over:
-        first, _ = left_over.popitem()
-        start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
-        chain = _neighbours(lanelets, *start, to_the_left=True)
-        for member, _ in chain:
-            left_over.pop(member, None)
-        lines = [_bound(lanelets[chain[0][0]], chain[0][1], left=False)]
-        lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
-        ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
-        starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
-        outlines.append(np.concatenate((lines[0], ends, lines[-1][::-1], starts)))
-    return outlines
-
-
-def _neighbours(
-    lanelets: Mapping[int, Any], lanelet_id: int, forward: bool, to_the_left: bool
-) -> list[tuple[int, bool]]:
-    """The lanelet and those beside it on one side, each with whether it runs in the chain's direction."""
-    chain = [(lanelet_id, forward)]
-    seen = {lanelet_id}
-    while True:
-        lanelet = lanelets[lanelet_id]
-        if forward == to_the_left:
-            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
-        else:
-            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
-        if lanelet_id not in lanelets or lanelet_id in seen:
-            return chain
-        forward = forward == bool(same)
-        chain.append((lanelet_id, forward))
-        seen.add(lanelet_id)
-
-
-def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
-    """Left or right bound (V, 2) of a lanelet, seen and ordered along the chain's direction."""
-    vertices = lanelet.left_vertices if left == forward else lanelet.right_vertices
-    return np.asarray(vertices[:: 1 if forward else -1, :2], dtype=np.float64)

@@ -15,6 +15,7 @@ The drivability checker's own test runs an optimiser on every transition (6 to 1
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -54,13 +55,16 @@ LIMITS = ("steering_rate", "steering_angle", "speed", "acceleration", "friction"
 # share is no reason by itself: the official test does not compare steering angles, so the rate is cut
 # off there and the position and orientation that it leads to decide.
 _STEERING_RATE = 0.9
-_ACCEPT = np.array([np.inf, 0.95, 0.98, 0.9, 0.9, 0.5, 0.4])[:, None]
+_ACCEPT_LIST = (math.inf, 0.95, 0.98, 0.9, 0.9, 0.5, 0.4)
+_ACCEPT = np.array(_ACCEPT_LIST)[:, None]
 # Where the model cuts the acceleration off (engine power above v_switch, top speed) the cost is flat,
 # and the optimiser, which overshoots, stays there if that is already better than its start at zero:
 # from half of the limit on.
 _ENGINE = 0.45
 # clearly_drivable stays this much below a limit, so that rounding cannot make it laxer.
 _SURE = 1.0 - 1e-9
+# Samples at least this far apart [m] are those of a moving vehicle.
+_MOVES = 1e-9
 # The official integrator's error is relative to the coordinates; far from the origin [m] it hides the
 # cost's slope from the optimiser.
 _FAR = 5000.0
@@ -190,15 +194,16 @@ def body_angles(
     """Slip angle and orientation (K,) [rad] along a path; arguments and rules as in :func:`drive`."""
     step = distance[1:] - distance[:-1]
     turn = heading[1:] - heading[:-1]
-    moving = step > 1e-9
-    if moving.all():
+    if np.minimum.reduce(step, initial=np.inf) > _MOVES:
         if not np.minimum.reduce(speed) > 0.0:
             step = np.copysign(step, speed[1:] + speed[:-1])
-        slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+        slip = _slip_angle(turn, step, step, vehicle.rear, slip0)
         return slip, heading - slip
+    moving = step > _MOVES
     step = np.where(moving, np.copysign(step, speed[1:] + speed[:-1]), 0.0)
     turn = np.where(moving, turn, 0.0)
-    slip = _slip_angle(turn, step, moving, vehicle.rear, slip0)
+    # Where nothing moves, nothing turns: a length of 1 there only avoids the division by zero.
+    slip = _slip_angle(turn, step, np.where(moving, step, 1.0), vehicle.rear, slip0)
     return slip, heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
 
 
@@ -210,25 +215,23 @@ def driven_states(
     return DrivenStates(t, xy[:, 0], xy[:, 1], steering, speed * np.cos(slip), orientation)
 
 
-def _slip_angle(
-    turn: Array, step: Array, moving: npt.NDArray[np.bool_], rear: float, slip0: float | None
-) -> Array:
+def _slip_angle(turn: Array, step: Array, length: Array, rear: float, slip0: float | None) -> Array:
     """Integrate d(beta)/d(sigma) = d(theta)/d(sigma) - sin(beta)/b over the samples.
 
-    Each interval is split: half of the turn, then a straight piece, then the other half. On a straight
-    piece the rear axle draws a tractrix, tan(beta/2) shrinking by exp(-step/b) exactly; the turn is
-    scaled so that the small-angle solution at constant curvature is exact as well. In tan(beta/2) a
-    rotation is a Möbius map, so that the recurrence needs no trigonometric function.
+    ``length`` is ``step`` but for intervals on which nothing moves, and not 0 there. Each interval is
+    split: half of the turn, then a straight piece, then the other half. On a straight piece the rear
+    axle draws a tractrix, tan(beta/2) shrinking by exp(-step/b) exactly; the turn is scaled so that the
+    small-angle solution at constant curvature is exact as well. In tan(beta/2) a rotation is a Möbius
+    map, so that the recurrence needs no trigonometric function.
     """
     if slip0 is None:
-        first = int(np.argmax(moving)) if moving.any() else -1
-        bend = float(rear * turn[first] / step[first]) if first >= 0 else 0.0
+        first = int(np.argmax(step != 0.0)) if len(step) else -1
+        bend = float(rear * turn[first] / length[first]) if first >= 0 else 0.0
         slip0 = float(np.arcsin(min(max(bend, -0.95), 0.95)))
     if not len(step):
         return np.array([slip0])
     ratio = step * (0.5 / rear)
-    # Where nothing moves, nothing turns: a ratio of 1 there only avoids the division by zero.
-    half = 0.5 * turn * np.tanh(ratio) / (ratio + ~moving)
+    half = rear * turn * np.tanh(ratio) / length
     rotation = half.copy()
     rotation[1:] += half[:-1]
     value = float(np.tan(0.5 * slip0))
@@ -297,39 +300,87 @@ def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> Kinematic
     return KinematicReport(ok, margin, worst, use)
 
 
-def clearly_drivable(states: DrivenStates, dt: float, vehicle: Vehicle) -> bool:
+def clearly_drivable(
+    xy: Array, speed: Array, slip: Array, orientation: Array, dt: float, vehicle: Vehicle
+) -> bool:
     """Whether :func:`direct_check` accepts every transition: True implies it, False says nothing.
 
-    Bounds over the whole trajectory stand in for those of the single transitions, which leaves few
-    calls; nearly all trajectories that are good are good by these as well.
+    Bounds over the whole trajectory stand in for those of the single transitions, and the trapezoidal
+    rule, with a bound of its error, for Simpson's: this leaves few calls, and nearly all trajectories
+    that are good are good by these as well.
+
+    Parameters
+    ----------
+    xy : (T, 2) array
+        The vehicle's centre [m] at the scenario's time steps.
+    speed, slip, orientation : (T,) array
+        Speed of the centre [m/s], slip angle and orientation [rad]; see :func:`driven_states`.
     """
-    delta, v = states.steering, states.speed
-    _, steering, speed, acceleration, friction, position, orientation = _ACCEPT[:, 0].tolist()
-    change = v[1:] - v[:-1]
-    slowest, fastest = float(np.minimum.reduce(v)), float(np.maximum.reduce(v))
-    fall, rise = float(np.minimum.reduce(change)), float(np.maximum.reduce(change))
+    _, steering, top, acceleration, friction, position, angle = _ACCEPT_LIST
+    rows = np.empty((4, len(slip)))
+    v, tangent, turning, psi = rows
+    np.tan(slip, out=tangent)  # that of the steering angle times rear / wheelbase
+    np.multiply(speed, np.cos(slip), out=v)
+    np.multiply(v, tangent, out=turning)  # rate of the orientation times rear
+    psi[:] = orientation
+    change = rows[:, 1:] - rows[:, :-1]
+    low, high = np.minimum.reduce(rows, axis=1).tolist(), np.maximum.reduce(rows, axis=1).tolist()
+    fall, rise = np.minimum.reduce(change, axis=1).tolist(), np.maximum.reduce(change, axis=1).tolist()
+    fastest, steepest, turn = [max(-a, b) for a, b in zip(low[:3], high[:3], strict=True)]
+    dv, dtangent, dturning, dpsi = [max(-a, b) for a, b in zip(fall, rise, strict=True)]
+    engine = acceleration * vehicle.a_max
     if fastest > vehicle.v_switch:
         engine = _ENGINE * vehicle.a_max * vehicle.v_switch / fastest
-    else:
-        engine = acceleration * vehicle.a_max
-    lateral = v * v * np.tan(delta) / vehicle.wheelbase
-    total = (change * change) / (dt * dt) + (lateral * lateral)[:-1]
-    within = (
-        float(np.maximum.reduce(np.abs(delta))) <= _SURE * steering * vehicle.steering_max
-        and fastest + max(rise, 0.0) <= _SURE * speed * vehicle.v_max
-        and slowest + min(fall, 0.0) >= _SURE * speed * vehicle.v_min
-        and rise <= _SURE * engine * dt
-        and -fall <= _SURE * acceleration * vehicle.a_max * dt
-        and float(np.maximum.reduce(total)) <= (_SURE * friction * vehicle.a_max) ** 2
-        and float(np.maximum.reduce(np.abs((states.x, states.y)), axis=None)) <= _FAR
-    )
-    if not within:
+    to_steering = vehicle.wheelbase / vehicle.rear  # from the slip angle's tangent; atan has slope <= 1
+    if not (
+        steepest * to_steering <= math.tan(_SURE * steering * vehicle.steering_max)
+        and dtangent * to_steering <= _SURE * dt * _STEERING_RATE * vehicle.steering_rate_max  # no cut
+        and high[0] + max(rise[0], 0.0) <= _SURE * top * vehicle.v_max
+        and low[0] + min(fall[0], 0.0) >= _SURE * top * vehicle.v_min
+        and rise[0] <= _SURE * engine * dt
+        and -fall[0] <= _SURE * acceleration * vehicle.a_max * dt
+        and math.hypot(dv / dt, fastest * turn / vehicle.rear) <= _SURE * friction * vehicle.a_max
+    ):
         return False
-    shift, turn = _errors(states, dt, vehicle)
-    return bool(
-        np.maximum.reduce(shift) <= _SURE * position * POSITION_TOLERANCE
-        and np.maximum.reduce(turn) <= _SURE * orientation * ORIENTATION_TOLERANCE
+    centre = np.ascontiguousarray(xy).view(np.complex128)[:, 0]
+    largest = (fastest, steepest, dv, dtangent, dturning, dpsi)
+    shift, turned = _error_bounds(centre, v, turning, psi, largest, dt, vehicle)
+    return (
+        turned <= _SURE * angle * ORIENTATION_TOLERANCE
+        and shift <= _SURE * position * POSITION_TOLERANCE
+        and float(np.maximum.reduce(np.abs(centre.view(np.float64)))) <= _FAR
     )
+
+
+def _error_bounds(
+    centre: npt.NDArray[np.complexfloating[Any, Any]],
+    v: Array,
+    turning: Array,
+    psi: Array,
+    largest: tuple[float, float, float, float, float, float],
+    dt: float,
+    vehicle: Vehicle,
+) -> tuple[float, float]:
+    """Bounds of what :func:`_errors` gives: of the position and of the orientation.
+
+    The trapezoidal rule stands in for Simpson's. What the two differ by, at most, is added: each term
+    is half a step's second difference of a factor, a product of two changes, or follows from these.
+    ``largest`` holds the speed, the tangent of the slip angle and the changes of ``v``, of that tangent,
+    of ``turning`` (the product of the two) and of ``psi``, which are largest in size.
+    """
+    fastest, steepest, dv, dtangent, dturning, dpsi = largest
+    rear, to_steering = vehicle.rear, vehicle.wheelbase / vehicle.rear
+    steep, dsteep = steepest * to_steering, dtangent * to_steering
+    # between two steering angles, the tangent in the middle and the mean of the tangents
+    bow = 0.25 * dsteep * dsteep * steep * (1.0 + steep * steep) / to_steering
+    off = np.abs(psi[1:] - psi[:-1] - (0.5 * dt / rear) * (turning[1:] + turning[:-1]))
+    turned = float(np.maximum.reduce(off)) + dt / rear * (dv * dtangent / 6.0 + fastest * bow / 1.5)
+    direction = np.exp(1j * psi)
+    axle, way = centre - rear * direction, (0.5 * dt) * v * direction
+    missed = np.abs((axle[1:] - axle[:-1] - way[1:] - way[:-1]).view(np.float64))
+    # directions at the end and in the middle of a step: those simulated and those used here
+    spread = 0.5 * turned + dt * dturning / (12.0 * rear) + dpsi * dpsi / 12.0
+    return float(np.maximum.reduce(missed)) + dt * (dv * dpsi / 6.0 + fastest * spread), turned
 
 
 def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:

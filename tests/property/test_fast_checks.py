@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repair.collision import CollisionWorld, RoadBoundary, _grouping
-from repair.kinematics import DrivenStates, clearly_drivable, direct_check, drive
+from repair import kinematics
+from repair.checker import Checker
+from repair.collision import CollisionWorld
+from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
+from repair.metrics import peaks
+from repair.road import RoadBoundary, RoadCorridor, _grouping
+from repair.scene.frame import CartesianPath, FrenetFrame
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
 
@@ -83,6 +88,49 @@ def test_poses_that_are_nowhere_are_off_the_road(bad):
         assert road.first_off_road(*poses) == 7
 
 
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_corridor_holds_only_what_is_on_the_road(seed):
+    rng = np.random.default_rng(seed)
+    road = ragged_road(rng)
+    along = np.linspace(-30.0, 95.0, 60)
+    bends = rng.uniform(0, 4) * np.sin(along / rng.uniform(8, 40) + rng.uniform(0, 6))
+    frame = FrenetFrame.from_points(np.column_stack((along, bends)))
+    corridor = RoadCorridor(road, frame, EGO)
+    s, l = rng.uniform(-5, frame.length + 5, 400), rng.normal(0, 2, 400)  # noqa: E741
+    xy = frame.to_cartesian(s, l)
+    orientation = frame.heading(s) + rng.normal(0, rng.choice([0.0, 0.1, 1.0]), 400)
+    s = s + rng.choice([0.0, 0.0, 1.0, 200.0], 400)  # a wrong cell may only say that it does not know
+    held = corridor.holds(s, np.ascontiguousarray(xy).view(np.complex128)[:, 0], orientation)
+    assert road._inside(road._outline(*xy.T, orientation))[held].all()
+
+
+def test_the_corridor_holds_nearly_up_to_the_edge():
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -0.5))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    corridor = RoadCorridor(road, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    s = np.linspace(0.0, 60.0, 161)
+    for y, held in ((4.9, True), (5.1, False), (-2.4, True), (-2.6, False)):
+        centre = s + 1j * (y - np.sign(y) * 0.5 * EGO.width)
+        assert corridor.holds(s, centre, np.zeros(161)).all() == held
+        assert corridor.holds(s, centre, np.zeros(161)).any() == held
+
+
+def test_the_corridor_does_not_hold_what_is_nowhere():
+    edge = np.array([[-20.0, 5.0], [90.0, 5.0]])
+    network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -1))])
+    road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
+    corridor = RoadCorridor(road, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    for place in (complex(np.nan, 0.0), complex(3.0, np.nan), 1e300 + 0j):
+        assert not corridor.holds(np.array([3.0]), np.array([place]), np.zeros(1)).any()
+    for angle in (np.nan, np.inf, 1e300):
+        assert not corridor.holds(np.array([3.0]), np.array([3.0 + 0j]), np.array([angle])).any()
+    nowhere = RoadBoundary(SimpleNamespace(lanelet_network=SimpleNamespace(lanelets=[])), EGO)
+    corridor = RoadCorridor(nowhere, FrenetFrame.from_points(np.array([[0.0, 0.0], [60.0, 0.0]])), EGO)
+    assert not corridor.holds(np.array([3.0]), np.array([3.0 + 0j]), np.zeros(1)).any()
+
+
 # -------------------------------------------------------------------- contact
 
 
@@ -125,6 +173,46 @@ def test_looking_at_blocks_drops_no_contact(seed):
     assert world._first(x, y, heading, start) == found
 
 
+# --------------------------------------------------------------------- limits
+
+
+@settings(max_examples=500, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_what_is_well_within_the_limits_breaks_none(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 40))
+    speed = rng.uniform(-1, 12) + np.cumsum(rng.normal(0, rng.choice([0.0, 0.01, 0.1]), n))
+    heading = np.cumsum(rng.normal(0, rng.choice([0.0, 0.001, 0.01]), n))
+    path = CartesianPath(0.025 * np.arange(n), np.zeros((n, 2)), heading, speed, np.zeros(n))
+    late = int(rng.integers(0, n))
+    reached = peaks(path, slice(late, None))
+    share = rng.uniform(0.95, 1.3, 5)  # the limits are near to what is reached
+    limits = SimpleNamespace(
+        v_max=share[0] * abs(reached.max_speed),
+        a_min=min(-1e-3, share[1] * reached.min_acceleration),
+        a_max=max(1e-3, share[2] * reached.max_acceleration),
+        a_lat=max(1e-3, share[3] * reached.max_lateral_acceleration),
+        a_total=max(1e-3, share[4] * reached.max_total_acceleration),
+    )
+    checker = Checker.__new__(Checker)
+    checker.limits = limits
+    if checker._well_within_limits(path, late):
+        checker._well_within_limits = lambda path, late: False
+        assert checker._limits(path, late, 0.0) == []
+
+
+def test_gentle_driving_is_well_within_the_limits():
+    t = 0.025 * np.arange(80)
+    path = CartesianPath(t, np.zeros((80, 2)), 0.05 * t, 10.0 - t, 10.0 * t)
+    checker = Checker.__new__(Checker)
+    checker.limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
+    assert checker._well_within_limits(path, 0)
+    assert checker._well_within_limits(path, 30)
+    for bad in (np.nan, 30.0):
+        path.speed[40] = bad
+        assert not checker._well_within_limits(path, 30)
+
+
 # ----------------------------------------------------------------- kinematics
 
 
@@ -138,7 +226,8 @@ def ride(rng, vehicle, dt):
     xy = np.cumsum(np.column_stack((np.cos(heading), np.sin(heading))) * step[:, None], axis=0)
     xy += rng.choice([0.0, 0.0, 0.0, 4990.0, 1e6]) + rng.normal(0, rng.choice([0.0, 0.0, 0.003]), (n, 2))
     distance = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))))
-    return drive(np.arange(n) * dt, xy, heading, speed, distance, vehicle)
+    slip, orientation = body_angles(heading, speed, distance, vehicle)
+    return xy, speed, slip, orientation
 
 
 @settings(max_examples=500, derandomize=True, deadline=None)
@@ -146,16 +235,37 @@ def ride(rng, vehicle, dt):
 def test_clearly_drivable_is_drivable_step_by_step(seed, type_id):
     rng = np.random.default_rng(seed)
     vehicle, dt = load_vehicle(type_id), float(rng.choice([0.04, 0.1, 0.2]))
-    states = ride(rng, vehicle, dt)
-    if clearly_drivable(states, dt, vehicle):
+    motion = ride(rng, vehicle, dt)
+    if clearly_drivable(*motion, dt, vehicle):
+        states = driven_states(np.arange(len(motion[0])) * dt, *motion, vehicle)
         assert direct_check(states, dt, vehicle).ok.all()
 
 
-@pytest.mark.parametrize("name", ["x", "y", "steering", "speed", "orientation"])
-def test_what_is_not_a_number_is_not_clearly_drivable(name):
+@pytest.mark.parametrize("errors", ["shift", "turn"])
+def test_the_bounds_of_clearly_drivable_hold_for_the_errors(errors, monkeypatch):
+    """With one tolerance cut down to a drive's own error, that drive must not pass."""
+    name = "POSITION_TOLERANCE" if errors == "shift" else "ORIENTATION_TOLERANCE"
+    share = 0.5 if errors == "shift" else 0.4
+    rng, asked = np.random.default_rng(3), 0
+    for _ in range(3000):
+        with monkeypatch.context() as patch:
+            motion = ride(rng, EGO, 0.1)
+            if not clearly_drivable(*motion, 0.1, EGO):
+                continue
+            states = driven_states(np.arange(len(motion[0])) * 0.1, *motion, EGO)
+            error = float(np.max(_errors(states, 0.1, EGO)[errors == "turn"]))
+            patch.setattr(kinematics, name, error / share * (1.0 - 1e-6))
+            asked += error > 1e-6
+            assert error <= 1e-9 or not clearly_drivable(*motion, 0.1, EGO)
+    assert asked > 100
+
+
+@pytest.mark.parametrize("column", range(5))
+def test_what_is_not_a_number_is_not_clearly_drivable(column):
     t = np.arange(9) * 0.1
-    columns = {"x": 10.0 * t, "y": 0 * t, "steering": 0 * t, "speed": 0 * t + 10.0, "orientation": 0 * t}
-    assert clearly_drivable(DrivenStates(t, **columns), 0.1, EGO)
+    rows = np.array((10.0 * t, 0 * t, 0 * t + 10.0, 0 * t, 0 * t))
+    assert clearly_drivable(rows[:2].T, *rows[2:], 0.1, EGO)
     for k in range(9):
-        broken = columns | {name: np.where(np.arange(9) == k, np.nan, columns[name])}
-        assert not clearly_drivable(DrivenStates(t, **broken), 0.1, EGO)
+        rows[column, k], kept = np.nan, rows[column, k]
+        assert not clearly_drivable(rows[:2].T, *rows[2:], 0.1, EGO)
+        rows[column, k] = kept

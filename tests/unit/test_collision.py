@@ -55,7 +55,7 @@ def test_rectangles_as_in_pycrcc():
     other = np.column_stack((rng.uniform(-5, 5, (n, 2)), rng.uniform(-4, 4, n), rng.uniform(0.1, 4, (n, 2))))
     offset = (other[:, :2] - ego[:, :2]) @ [1.0, 1j] * np.exp(-1j * ego[:, 2])
     turn = np.exp(1j * (other[:, 2] - ego[:, 2]))
-    ours = _rectangles_touch(offset, turn, HALF, other[:, 3:].T)
+    ours = _rectangles_touch(offset, turn, np.array(HALF), other[:, 3:])
     theirs = [
         RectOBB(*HALF, e[2], e[0], e[1]).collide(RectOBB(o[3], o[4], o[2], o[0], o[1]))
         for e, o in zip(ego, other, strict=True)
@@ -76,8 +76,8 @@ def test_polygons_as_in_shapely():
         c, s = np.cos(heading), np.sin(heading)
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * HALF @ np.array([[c, s], [-s, c]]) + (x, y)
         answers.append(shapely.Polygon(corners).intersects(shapely.Polygon(polygon)))
-        assert _polygon_touches(polygon, (x, y, c, s), HALF) == answers[-1]
-        assert _polygon_touches(polygon[:-1][::-1], (x, y, c, s), HALF) == answers[-1]
+        assert _polygon_touches(polygon, (x, y, c, s), np.array(HALF)) == answers[-1]
+        assert _polygon_touches(polygon[:-1][::-1], (x, y, c, s), np.array(HALF)) == answers[-1]
     assert 0.2 < np.mean(answers) < 0.8
 
 

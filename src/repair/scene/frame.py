@@ -139,7 +139,8 @@ class FrenetFrame:
     def _locate(self, s: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array]:
         query = np.asarray(s, dtype=np.float64)
         # fmax/fmin send NaN to segment 0; the offset stays NaN and so does the result
-        where = np.floor(query * self._inverse) + 1.0
+        # and what is not negative is rounded down by the cast
+        where = query * self._inverse + 1.0
         index = np.fmin(np.fmax(where, 0.0), self._last).astype(np.intp)
         return index, query - self._knots.take(index)
 
@@ -168,8 +169,15 @@ class FrenetFrame:
         return self._continuous(np.arctan2(y1, x1), index)
 
     def _continuous(self, angle: Array, index: Any) -> Array:
+        if self._principal:
+            return angle
         turns = np.rint((self._turns.take(index) - angle) / (2.0 * np.pi))
         return np.asarray(angle + 2.0 * np.pi * turns)
+
+    @cached_property
+    def _principal(self) -> bool:
+        """Whether the heading stays away from +-pi, so that no turn has to be added to arctan2's value."""
+        return bool(np.abs(self.heading_table).max() < 0.75 * np.pi)
 
     def curvature(self, s: npt.ArrayLike) -> Array:
         """Curvature [1/m] at ``s``, left positive."""
@@ -286,24 +294,24 @@ class FrenetFrame:
         x1, y1 = tangent[0], tangent[1]
         square = x1 * x1 + y1 * y1
         offset = position[:, 1] / np.sqrt(square)
-        plane = np.empty_like(axis)
-        np.subtract(axis[0], offset * y1, out=plane[0])
-        np.add(axis[1], offset * x1, out=plane[1])
+        plane, motion = np.empty((2, len(s)), dtype=np.complex128)
+        np.subtract(axis[0], offset * y1, out=plane.real)
+        np.add(axis[1], offset * x1, out=plane.imag)
         bend = (x1 * second[1] - y1 * second[0]) / square  # half of the curvature times the tangent's length
         forward = s_rate * (1.0 - 2.0 * bend * offset)
-        speed = np.hypot(forward, sideways)
+        motion.real, motion.imag = forward, sideways
+        speed = np.abs(motion)
         base = self._continuous(np.arctan2(y1, x1), index)
         if s_rate.size and np.minimum.reduce(s_rate) >= 0.0:
-            slip = np.arctan2(sideways, forward)
+            heading = _held(base + np.arctan2(sideways, forward), base, speed)
         else:
             sign = np.where(s_rate < 0.0, -1.0, 1.0)
             slip = np.arctan2(sign * sideways, sign * forward)
+            heading = _held(base + slip, base, speed)
             speed *= sign
-        heading = _held(base + slip, base, np.abs(speed))
-        step = plane[:, 1:] - plane[:, :-1]
         distance = np.zeros(len(s))
-        np.add.accumulate(np.hypot(step[0], step[1]), out=distance[1:])
-        return CartesianPath(t, plane.T, heading, speed, distance)
+        np.add.accumulate(np.abs(plane[1:] - plane[:-1]), out=distance[1:])
+        return CartesianPath(t, plane.view(np.float64).reshape(-1, 2), heading, speed, distance)
 
 
 def _pairs(x: Array, y: Array) -> Array:

@@ -1,0 +1,311 @@
+"""The edge of the road: whether the ego's oriented rectangle lies properly inside.
+
+The verdicts are at least as strict as those of the drivability checker
+(``commonroad_dc.feasibility.solution_checker``), see :class:`RoadBoundary`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.types import Array
+
+if TYPE_CHECKING:
+    from repair.scene.frame import FrenetFrame
+    from repair.scene.vehicle import Vehicle
+
+__all__ = ["RoadBoundary", "RoadCorridor"]
+
+Points = npt.NDArray[np.complexfloating[Any, Any]]
+
+# The rectangle may come this close to the edge [m] only where the exact test says so.
+_TOUCH = 1e-6
+# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
+_BOX = 4.0
+
+
+class RoadBoundary:
+    """The road as one region: the ego's rectangle must lie properly inside.
+
+    The region is the union of the lane sections, a section being a lanelet with all its lateral
+    neighbours; the drivability checker's triangulated boundary
+    (``solution_checker._construct_boundary_checker``) fills what is outside the same sections. That
+    triangulation needs the package ``triangle``, whose licence is not free; where it is installed,
+    :meth:`official_off_road` asks it as well.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+        Only read.
+    vehicle : Vehicle
+        The ego.
+    """
+
+    def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
+        import shapely
+
+        self._scenario = scenario
+        self._corners = 0.5 * np.array(
+            [[vehicle.length, vehicle.width], [-vehicle.length, vehicle.width],
+             [-vehicle.length, -vehicle.width], [vehicle.length, -vehicle.width]]
+        )  # fmt: skip
+        outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
+        self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
+        shapely.prepare(self.region)
+        # More than the rounding of any coordinate of the region.
+        self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
+        self._triangles: Any = None
+
+    def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
+
+        Parameters
+        ----------
+        x, y, orientation : (K,) array
+            Centre [m] and orientation [rad] of the ego.
+        """
+        known = self._surely_inside(x, y, orientation)
+        if known.all():
+            return None
+        unsure = np.flatnonzero(~known)
+        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
+        return None if inside.all() else int(unsure[np.argmin(inside)])
+
+    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
+        """Whether polygons (K, V, 2) lie properly inside of the region."""
+        import shapely
+
+        return np.asarray(shapely.contains_properly(self.region, shapely.polygons(outlines)))
+
+    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
+        """Poses (K,) that lie inside because a larger box does; False says nothing.
+
+        One box, turned like the pose in its middle, holds several consecutive poses: asking about
+        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
+        a pose turned by an angle t reaches farther, at most size * |t|.
+        """
+        count = len(x)
+        known = np.zeros(count, dtype=np.bool_)
+        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
+        if not np.isfinite(np.array((x, y, orientation))).all():
+            return known
+        size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
+        if size < 2:
+            return known
+        pose = _grouping(count, size)
+        middle = pose[size // 2]
+        centre = x + 1j * y
+        heading, origin = orientation[middle], centre[middle]
+        axis = np.exp(1j * heading)
+        seen = ((centre[pose] - origin) * axis.conj()).view(np.float64)
+        turn = np.maximum.reduce(np.abs(orientation[pose] - heading), axis=0)
+        half = self._corners[0] + self.spare + turn[:, None] * self._corners[0, ::-1]
+        sides = np.empty((len(middle), 4))
+        sides[:, :2] = np.minimum.reduce(seen, axis=0).reshape(-1, 2) - half
+        sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
+        corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
+        corners = corners * axis[:, None] + origin[:, None]
+        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
+        known[pose[:, inside] if not inside.all() else slice(None)] = True
+        return known
+
+    def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
+        """Whether the ego is off the road already at this pose."""
+        return self.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
+
+    def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
+        """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
+        cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
+        forward, left = self._corners[:, 0], self._corners[:, 1]
+        corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
+        return np.nan_to_num(np.stack(corners, axis=2), nan=1e12, posinf=1e12, neginf=-1e12)
+
+    def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """As :meth:`first_off_road`, by the drivability checker's triangulation, built at the first call.
+
+        The two differ only next to ends of the map: the triangulation has no edge across the end of a
+        section that has successors, and a triangle may reach into the road there. None also where the
+        triangulation cannot be had (:attr:`official_available`).
+        """
+        if not self.official_available:
+            return None
+        import shapely
+
+        hits = self._triangles.query(
+            shapely.polygons(self._outline(x, y, orientation)), predicate="intersects"
+        )
+        return int(hits[0].min()) if hits.size else None
+
+    @property
+    def official_available(self) -> bool:
+        """Whether the checker can triangulate this road: it fails on some, or lacks ``triangle``."""
+        if self._triangles is None:
+            import shapely
+            from commonroad_dc.boundary import construction
+
+            try:
+                parts = construction.construct(self._scenario, ["section_triangles", "triangulation"])
+            except Exception:  # whatever goes wrong in there, there is no triangulation to ask
+                self._triangles = False
+            else:
+                # As plain geometry: pycrcc reports objects that live until the interpreter's exit as leaks.
+                corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
+                self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
+        return self._triangles is not False
+
+
+# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
+_MOST = 32
+_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
+
+
+@lru_cache(maxsize=256)
+def _grouping(count: int, size: int) -> npt.NDArray[np.intp]:
+    """Indices (size, G) of consecutive poses in groups; the last pose fills up the last group."""
+    groups = np.minimum(np.arange(-(-count // size) * size), count - 1).reshape(-1, size)
+    by_place = np.ascontiguousarray(groups.T)
+    by_place.setflags(write=False)
+    return by_place
+
+
+def _section_outlines(network: Any) -> list[Array]:
+    """Outline (V, 2) of every lane section: a lanelet with its lateral neighbours, right to left."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
+    left_over = dict.fromkeys(lanelets)
+    outlines = []
+    while left_over:
+        first, _ = left_over.popitem()
+        start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
+        chain = _neighbours(lanelets, *start, to_the_left=True)
+        for member, _ in chain:
+            left_over.pop(member, None)
+        lines = [_bound(lanelets[chain[0][0]], chain[0][1], left=False)]
+        lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
+        ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
+        starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
+        outlines.append(np.concatenate((lines[0], ends, lines[-1][::-1], starts)))
+    return outlines
+
+
+def _neighbours(
+    lanelets: Mapping[int, Any], lanelet_id: int, forward: bool, to_the_left: bool
+) -> list[tuple[int, bool]]:
+    """The lanelet and those beside it on one side, each with whether it runs in the chain's direction."""
+    chain = [(lanelet_id, forward)]
+    seen = {lanelet_id}
+    while True:
+        lanelet = lanelets[lanelet_id]
+        if forward == to_the_left:
+            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
+        else:
+            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
+        if lanelet_id not in lanelets or lanelet_id in seen:
+            return chain
+        forward = forward == bool(same)
+        chain.append((lanelet_id, forward))
+        seen.add(lanelet_id)
+
+
+def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
+    """Left or right bound (V, 2) of a lanelet, seen and ordered along the chain's direction."""
+    vertices = lanelet.left_vertices if left == forward else lanelet.right_vertices
+    return np.asarray(vertices[:: 1 if forward else -1, :2], dtype=np.float64)
+
+
+# Cells of a corridor: one about every _CELL metres, for poses up to _ALONG before or behind its middle;
+# edges farther than _ASIDE from the axis are not looked for.
+_CELL = 1.0
+_ALONG = 0.9
+_ASIDE = 10.0
+
+
+class RoadCorridor:
+    """Rectangles along a frame's axis that lie properly inside of the road, found once per scene.
+
+    A cell's rectangle is aligned with the axis at its middle. A pose is on the road if its own
+    rectangle lies in that of a cell, which takes a few array operations; whether the best cell was
+    looked at makes no difference to that.
+
+    Parameters
+    ----------
+    road : RoadBoundary
+    frame : FrenetFrame
+        The axis.
+    vehicle : Vehicle
+        The ego.
+    """
+
+    def __init__(self, road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle) -> None:
+        self._half_length, half_width = 0.5 * vehicle.length, 0.5 * vehicle.width
+        diagonal = float(np.hypot(self._half_length, half_width))
+        count = max(round(frame.length / _CELL), 1)
+        s = np.linspace(0.0, frame.length, count + 1)
+        self._inverse, self._last = count / frame.length, count
+        self._heading = frame.heading(s)
+        axis = np.exp(1j * self._heading)
+        middle = np.ascontiguousarray(frame.position(s)).view(np.complex128)[:, 0]
+        right, left = _room(road.region, middle, axis, _ALONG + diagonal + road.spare)
+        # Seen from the band's middle, both sides are alike.
+        self._middle = middle + 0.5j * (left + right) * axis
+        self._turn = axis.conj()
+        self._reach = np.empty((count + 1, 2))
+        self._reach[:, 0] = _ALONG
+        self._reach[:, 1] = 0.5 * (left - right) - half_width - road.spare
+
+    def holds(self, s: Array, centre: Points, orientation: Array) -> npt.NDArray[np.bool_]:
+        """Poses (K,) that are surely on the road; False says nothing.
+
+        Parameters
+        ----------
+        s : (K,) array
+            Arc length [m] along the frame, which chooses the cell.
+        centre : (K,) complex array
+            Positions x + iy [m].
+        orientation : (K,) array
+            Of the ego [rad], continuous with the frame's heading.
+        """
+        cell = np.rint(np.minimum(np.maximum(s * self._inverse, 0.0), self._last)).astype(np.intp)
+        seen = (centre - self._middle.take(cell)) * self._turn.take(cell)
+        room = self._reach.take(cell, axis=0)
+        room -= np.abs(seen.view(np.float64).reshape(-1, 2))
+        # Turned by an angle t, the rectangle reaches at most half its length * |t| farther aside.
+        room[:, 1] -= self._half_length * np.abs(orientation - self._heading.take(cell))
+        return np.asarray((room[:, 0] >= 0.0) & (room[:, 1] >= 0.0))
+
+
+def _room(region: Any, middle: Points, axis: Points, along: float) -> tuple[Array, Array]:
+    """How far a rectangle of half length ``along`` may reach to the right (<= 0) and left (>= 0).
+
+    Within these bounds (K,) no edge of the region meets it; both are 0 where nothing is known.
+    """
+    import shapely
+
+    left, right = np.full(len(middle), _ASIDE), np.full(len(middle), -_ASIDE)
+    rings = shapely.get_rings(shapely.get_parts(region))
+    xy, ring = shapely.get_coordinates(rings, return_index=True)
+    points = np.ascontiguousarray(xy).view(np.complex128)[:, 0]
+    start = np.flatnonzero(ring[1:] == ring[:-1])
+    edges = shapely.STRtree(shapely.linestrings(xy[start[:, None] + np.arange(2)]))
+    corners = np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j])
+    boxes = (along * corners.real + 1j * _ASIDE * corners.imag) * axis[:, None] + middle[:, None]
+    cell, edge = edges.query(shapely.polygons(boxes.view(np.float64).reshape(-1, 4, 2)))
+    seen = (points[start[edge] + np.arange(2)[:, None]] - middle[cell]) * axis[cell].conj()
+    # The part of each edge with |u| <= along, u and w being its coordinates seen from the cell.
+    u, w = seen.real, seen.imag
+    slope = np.where(u[1] == u[0], 0.0, (w[1] - w[0]) / np.where(u[1] == u[0], 1.0, u[1] - u[0]))
+    ends = np.where(u[1] == u[0], w, w[0] + slope * (np.clip(u, -along, along) - u[0]))
+    met = (u.min(axis=0) <= along) & (u.max(axis=0) >= -along)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    for bound, least, side, nearest in (
+        (left, np.minimum, met & (high >= 0.0), np.maximum(low, 0.0)),
+        (right, np.maximum, met & (low <= 0.0), np.minimum(high, 0.0)),
+    ):
+        least.at(bound, cell[side], nearest[side])
+    outside = ~shapely.contains_properly(region, shapely.points(middle.real, middle.imag))
+    left[outside] = right[outside] = 0.0
+    return right, left
