@@ -233,11 +233,11 @@ class EgoBackend:
         pairs = anchor_pairs(problem, greville, shape, self.degree)
         minimum = Minimum(initial.points, np.inf, 0, False)
         led = shape
-        rounds = 0
-        for _ in range(config.rebounds + 1):
-            rounds += 1
+        for rounds in range(1, config.rebounds + 2):
             cap = self._cap(problem, led)
             minimum = self._minimise_deformation(problem, minimum.points, pairs, collision, cap, deadline)
+            if rounds > config.rebounds:
+                break
             led = minimum.points
             clear = _closest(pairs, led) >= 0.0
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
