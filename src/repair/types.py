@@ -179,20 +179,23 @@ class Occupancy:
         step = self.t[1] - self.t[0] if len(self.t) > 1 else 1.0
         where = (np.asarray(times, dtype=np.float64) - self.t[0]) / step
         nearest = np.rint(where)
-        on_step = np.abs(where - nearest) < 1e-6
-        every = bool(on_step.all())
-        where = nearest if every else np.where(on_step, nearest, where)
-        last = len(self.t) - 1
-        low = np.floor(where).astype(np.intp)
-        lower, upper = (box.take(low, axis=1, mode="clip") for box in (self.lower, self.upper))
-        if not every:
+        off_step = np.abs(where - nearest) >= 1e-6
+        between = np.logical_or.reduce(off_step)
+        if between:
+            where = np.where(off_step, where, nearest)
+            low = np.floor(where).astype(np.intp)
+        else:
+            where = nearest
+            low = nearest.astype(np.intp)
+        lower, upper = self.lower.take(low, axis=1, mode="clip"), self.upper.take(low, axis=1, mode="clip")
+        if between:
             # On a step its own row counts alone: the next one may be NaN.
-            high = np.where(on_step, low, low + 1)
+            high = np.where(off_step, low + 1, low)
             weight = (where - low)[:, None]
             lower += weight * (self.lower.take(high, axis=1, mode="clip") - lower)
             upper += weight * (self.upper.take(high, axis=1, mode="clip") - upper)
-        outside = (where < 0) | (where > last)
-        if outside.any():
+        outside = (where < 0) | (where > len(self.t) - 1)
+        if np.logical_or.reduce(outside):
             lower[:, outside] = np.nan
             upper[:, outside] = np.nan
         return lower, upper

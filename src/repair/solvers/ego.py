@@ -122,7 +122,7 @@ def _with_pairs(bounds: SoftBounds, pairs: Pairs, collision: float) -> SoftBound
     return SoftBounds(
         np.concatenate((bounds.limit, -pairs.sign * pairs.anchor - pairs.threshold)),
         np.concatenate((bounds.joint, pairs.threshold)),
-        np.concatenate((bounds.weight, np.full(len(pairs.row), collision))),
+        np.concatenate((bounds.sixfold, np.full(len(pairs.row), 6.0 * collision))),
         np.concatenate((bounds.bend, (6.0 * collision) * pairs.threshold)),
     )
 
@@ -168,6 +168,8 @@ class EgoBackend:
         self.config = config or EgoConfig()
         self.degree = degree
         self.spacing = spacing
+        c = self.config
+        self._penalties = (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
 
     def solve(
         self,
@@ -296,12 +298,7 @@ class EgoBackend:
         limit = bounds.limit.copy()
         speeds = limit[: (n - 1) * len(axes) : len(axes)]
         np.minimum(speeds, cap, out=speeds)
-        return SoftBounds(limit, bounds.joint, bounds.weight, bounds.bend)
-
-    @property
-    def _penalties(self) -> tuple[float, ...]:
-        c = self.config
-        return c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse
+        return SoftBounds(limit, bounds.joint, bounds.sixfold, bounds.bend)
 
     def _resting(
         self, problem: RepairProblem, points: Array, weights: DeformWeights | RefineWeights

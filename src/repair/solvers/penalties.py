@@ -43,20 +43,21 @@ class SoftBounds(NamedTuple):
         Where the penalty of a quantity starts.
     joint : (K,) array
         D.
-    weight : (K,) array
+    sixfold : (K,) array
+        6 times the weight, by which the curvature grows with the excess up to the joint.
     bend : (K,) array
-        6 weight D, the curvature from the joint on.
+        6 times the weight times D, the curvature from the joint on.
     """
 
     limit: Array
     joint: Array
-    weight: Array
+    sixfold: Array
     bend: Array
 
     @classmethod
     def of(cls, limit: Array, joint: Array, weight: Array) -> SoftBounds:
         """Bounds with their curvature worked out."""
-        return cls(limit, joint, weight, 6.0 * weight * joint)
+        return cls(limit, joint, 6.0 * weight, 6.0 * weight * joint)
 
     def evaluate(self, x: Array, limit: Array | None = None) -> tuple[float, Array, Array]:
         """Sum of the weighted penalties of quantities (K,), and the slope and curvature of each.
@@ -68,14 +69,13 @@ class SoftBounds(NamedTuple):
         np.maximum(rest, 0.0, out=rest)
         cubic = np.minimum(rest, self.joint)
         rest -= cubic
-        curvature = self.weight * cubic
-        slope = curvature * cubic
-        value = float(slope.dot(cubic))
-        slope *= 3.0
+        curvature = self.sixfold * cubic
+        slope = 0.5 * curvature
+        slope *= cubic
+        value = float(slope.dot(cubic)) / 3.0
         beyond = self.bend * rest
         slope += beyond
         rest += self.joint
-        curvature *= 6.0
         return value + 0.5 * float(beyond.dot(rest)), slope, curvature
 
 
