@@ -9,6 +9,7 @@ alone and is kept for the life of the process.
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
 from functools import lru_cache
@@ -51,6 +52,46 @@ class Solution:
     violation: float
 
 
+class _Buffered:
+    """A CasADi function that reads and writes NumPy arrays of its own.
+
+    Called with DM it spends several times what a small QP takes on converting them.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        All its inputs dense, or given in ``fixed``.
+    fixed : casadi.DM
+        Inputs that never change, by name.
+    """
+
+    def __init__(self, function: Any, **fixed: Any) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._inputs: dict[str, Array] = {}
+        # An input that is left out would be read as zeros, or crash the plugin: all are set.
+        for k, name in enumerate(function.name_in()):
+            value = np.full(function.nnz_in(k), function.default_in(k))
+            if name in fixed:
+                value[:] = fixed[name].nonzeros()
+            self._inputs[name] = value
+            self._buffer.set_arg(k, value.data)
+        self._outputs: dict[str, Array] = {}
+        for k, name in enumerate(function.name_out()):
+            self._outputs[name] = np.zeros(function.nnz_out(k))
+            self._buffer.set_res(k, self._outputs[name].data)
+
+    def __call__(self, **values: Array) -> dict[str, Array]:
+        """Evaluate; the outputs by name are overwritten by the next call."""
+        for name, value in values.items():
+            self._inputs[name][:] = value
+        self._evaluate()
+        return self._outputs
+
+    def stats(self) -> dict[str, Any]:
+        """The solver's statistics of the last call."""
+        return dict(self._buffer.stats())
+
+
 class Model(Layout):
     """One NLP: its constant matrices, and the functions that solve it."""
 
@@ -58,6 +99,7 @@ class Model(Layout):
         begin = time.perf_counter()
         super().__init__(structure)
         self._deadline: _Deadline | None = None
+        self._lock = threading.Lock()  # models are shared, and so are their buffers
         try:
             self._compile()
         except RuntimeError as error:
@@ -89,10 +131,9 @@ class Model(Layout):
             bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
         names = ["x", "p", "lam_f", "lam_g"]
         curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
-        self._function = self._make_solver(nlp, curvature)
-        shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
-        self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False})
-        self._qp_data = {"h": hessian, "a": matrix}
+        self._function = _Buffered(self._make_solver(nlp, curvature))
+        self._qp = _quadratic_program("presolve", hessian, matrix)
+        self._linear_count = matrix.shape[0]
         self._compile_elastic()
 
     def _compile_elastic(self) -> None:
@@ -111,9 +152,9 @@ class Model(Layout):
         h[:m, :m] += 1e-4 * np.kron(
             np.eye(self.structure.axes), self.hessian[self.structure.degree :, self.structure.degree :]
         )
-        self._elastic_data = {"h": ca.DM(h), "a": _sparse(a)}
-        shapes = {k: v.sparsity() for k, v in self._elastic_data.items()}
-        self._elastic_qp = ca.conic("elastic", "daqp", shapes, {"error_on_fail": False})
+        self._elastic_qp = _quadratic_program("elastic", ca.DM(h), _sparse(a))
+        self._elastic_low = np.full(m + 1, -np.inf)
+        self._elastic_low[m] = 0.0
 
     def elastic(self, slope: Array, low: Array, high: Array) -> tuple[Array, float] | None:
         """Unknowns that keep all linear rows but the obstacles', and those as nearly as possible.
@@ -125,18 +166,17 @@ class Model(Layout):
             By how much [m] the obstacle rows are missed. None instead of both if even the other rows
             contradict each other.
         """
-        rows, m = self._qp_data["a"].shape
-        upper = high[:rows].copy()
+        rows = self._linear_count
+        low, upper = low[:rows], high[:rows].copy()
         upper[self._soft] = np.inf
-        lba = np.concatenate([low[:rows], np.full(len(self._soft), -np.inf)])
-        uba = np.concatenate([upper, high[self._soft]])
-        g = np.concatenate([1e-4 * slope, [100.0]])
-        lbx = np.concatenate([np.full(m, -np.inf), [0.0]])
-        out = self._elastic_qp(**self._elastic_data, g=g, lba=lba, uba=uba, lbx=lbx)
-        if int(self._elastic_qp.stats()["return_status"]) <= 0:
-            return None
-        x = np.asarray(out["x"]).ravel()
-        return x[:m], float(x[m])
+        lba = np.concatenate((low, np.full(len(self._soft), -np.inf)))
+        uba = np.concatenate((upper, high[self._soft]))
+        g = np.append(1e-4 * slope, 100.0)
+        with self._lock:
+            out = self._elastic_qp(g=g, lba=lba, uba=uba, lbx=self._elastic_low)
+            if int(self._elastic_qp.stats()["return_status"]) <= 0:
+                return None
+            return out["x"][:-1].copy(), float(out["x"][-1])
 
     def _nonlinear(self, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
         """Accelerations, curvature of the driven path, ends of the body at the samples.
@@ -200,11 +240,12 @@ class Model(Layout):
         possible : bool
             False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
-        rows = self._qp_data["a"].shape[0]
-        out = self._qp(**self._qp_data, g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
-        word = int(self._qp.stats()["return_status"])
-        if word > 0:
-            return np.asarray(out["x"]).ravel(), True
+        rows = self._linear_count
+        with self._lock:
+            out = self._qp(g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
+            word = int(self._qp.stats()["return_status"])
+            if word > 0:
+                return out["x"].copy(), True
         return x0, word != _DAQP_INFEASIBLE
 
     def solve(
@@ -225,18 +266,19 @@ class Model(Layout):
         deadline : float or None
             ``time.perf_counter()`` at which to stop; needs ``timed``.
         """
-        if self._deadline is not None:
-            self._deadline.at = deadline if deadline is not None else float("inf")
-        try:
-            out = self._function(x0=x0, p=np.concatenate([data.T.ravel(), slope]), lbg=low, ubg=high)
-        except RuntimeError as error:
-            return Solution(x0, _last_line(error), 0, np.inf)
-        x, g = np.asarray(out["x"]).ravel(), np.asarray(out["g"]).ravel()
-        violation = float(np.max(np.maximum(low - g, g - high), initial=0.0))
-        try:
-            stats = self._function.stats()
-        except RuntimeError:  # sqpmethod has no word for a QP that fails
-            return Solution(x, "QP_Failed", 0, violation)
+        with self._lock:
+            if self._deadline is not None:
+                self._deadline.at = deadline if deadline is not None else float("inf")
+            try:
+                out = self._function(x0=x0, p=np.concatenate((data.T.ravel(), slope)), lbg=low, ubg=high)
+            except RuntimeError as error:
+                return Solution(x0, _last_line(error), 0, np.inf)
+            x, g = out["x"].copy(), out["g"]
+            violation = float(np.maximum(low - g, g - high).max(initial=0.0))
+            try:
+                stats = self._function.stats()
+            except RuntimeError:  # sqpmethod has no word for a QP that fails
+                return Solution(x, "QP_Failed", 0, violation)
         return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
 
 
@@ -280,6 +322,14 @@ def _deadline_callback(nlp: dict[str, Any]) -> _Deadline:
 
     holder.callback = Watch()
     return holder
+
+
+def _quadratic_program(name: str, hessian: Any, matrix: Any) -> _Buffered:
+    import casadi as ca
+
+    shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
+    function = ca.conic(name, "daqp", shapes, {"error_on_fail": False})
+    return _Buffered(function, h=hessian, a=matrix)
 
 
 def _sparse(matrix: Array) -> Any:
