@@ -73,13 +73,19 @@ class _Sampled:
         return float(self.trajectory.t[-1])
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
-        times = np.asarray(t, dtype=np.float64)
-        known = self.trajectory
-        beyond = np.maximum(times - self.t_end, 0.0)[:, None]
-        position = np.column_stack([np.interp(times, known.t, known.position[:, k]) for k in (0, 1)])
-        velocity = np.column_stack([np.interp(times, known.t, known.velocity[:, k]) for k in (0, 1)])
+        times, known = np.asarray(t, dtype=np.float64), self.trajectory
+        position, velocity = np.empty((len(times), 2)), np.empty((len(times), 2))
+        for k in (0, 1):
+            position[:, k] = np.interp(times, known.t, known.position[:, k])
+            velocity[:, k] = np.interp(times, known.t, known.velocity[:, k])
+        position += np.maximum(times - known.t[-1], 0.0)[:, None] * velocity
         zero = np.zeros_like(position)
-        return FrenetTrajectory(times, position + beyond * velocity, velocity, zero, zero)
+        return FrenetTrajectory(times, position, velocity, zero, zero)
+
+
+def _guide(problem: RepairProblem) -> Curve:
+    """The curve that shows the way."""
+    return problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
 
 
 class CasadiBackend:
@@ -151,19 +157,16 @@ class CasadiBackend:
     def _instance(self, problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
         """Lay out the problem, and the initial control points (n, 2)."""
         n, p, h = model.structure.n, self.degree, self.spacing
-        reference = fit_to_curve(problem.reference, problem.t_rep, n, p, h)
         origin = np.array([problem.start[0, 0], 0.0])
-        state = problem.reference.sample([problem.t_rep])
         derivatives = np.zeros((p, 2))
         derivatives[:3] = problem.start
         if p > 3:
-            derivatives[3] = state.jerk[0]
+            derivatives[3] = problem.reference.sample([problem.t_rep]).jerk[0]
         head = splice_points(derivatives, p, h) - origin
-        guide: Curve = problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
-        points = fit_to_curve(guide, problem.t_rep, n, p, h).points - origin
-        points = np.vstack([head, points[p:]])
-        if not problem.lateral:
-            points[p:, 1] = reference.points[p:, 1]
+        points = fit_to_curve(_guide(problem), problem.t_rep, n, p, h).points - origin
+        points[:p] = head
+        if not problem.lateral and problem.passing is not None:
+            points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
         return Instance(problem, model, origin, head), points
 
     # -- rounds ----------------------------------------------------------------------------------
@@ -201,7 +204,7 @@ class CasadiBackend:
             shape = instance.shape(points)
             room = instance.room(shape, min(ROAD_SLACK, 0.5 * trust) if trust else ROAD_SLACK)
             separation = separate(
-                problem, instance.windows, len(model.obstacle), shape, room, separation.side
+                problem, instance.windows, len(model.obstacle), shape, room, separation.side, instance.boxes
             )
         detail = word
         if status is SolveStatus.SOLVED and not kept:
@@ -240,31 +243,31 @@ class CasadiBackend:
         obstacles by the least is asked for its sides instead, and so on.
         """
         model, problem, windows = instance.model, instance.problem, instance.windows
-        slope = instance.slope()
-        moment = windows.start[:, None] + windows.fraction * (windows.end - windows.start)[:, None]
-        guide: Curve = problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
-        shape = guide.sample(moment.ravel()).position.reshape(*moment.shape, 2)
+        slope = instance.slope
+        moment = windows.moment
+        shape = _guide(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
         if not problem.lateral:
             shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
         room = instance.room(shape)
         why, before = "", None
         closest: tuple[Array, dict[str, float]] | None = None
         for _ in range(_SIDES):
-            separation = separate(problem, windows, len(model.obstacle), shape, room)
+            separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
             if separation.why:
                 return separation, points, separation.why, closest
             side = separation.side
             if before is not None and side is not None and np.array_equal(side, before):
                 break
             before = side
-            why = why or _gap(separation)
-            low, high = instance.bounds(separation, points)
-            x, feasible = model.unknowns(points), not _gap(separation)
+            gap = _gap(separation)
+            why = why or gap
+            low, high = instance.bounds(separation, None)
+            x, feasible = model.unknowns(points), not gap
             if feasible:
                 x, feasible = model.presolve(x, slope, low, high)
             if feasible:
                 return separation, model.with_unknowns(points, x), "", closest
-            modest = instance.bounds(separation, points, modest=True)
+            modest = instance.bounds(separation, None, modest=True)
             elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
             if elastic is None:
                 why = why or "no curve from the start state keeps the limits and the road"
@@ -296,7 +299,7 @@ class CasadiBackend:
     ) -> tuple[Array, SolveStatus, str, int]:
         """One NLP: the new control points, the status, the solver's word, the iterations."""
         model = instance.model
-        x0, slope, data = model.unknowns(points), instance.slope(), instance.sample_data(points)
+        x0, slope, data = model.unknowns(points), instance.slope, instance.sample_data(points)
         solution = model.solve(x0, data, slope, low, high, deadline)
         status, word = _status(model, solution), solution.word
         if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):

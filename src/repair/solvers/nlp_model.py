@@ -118,7 +118,7 @@ class Model(Layout):
         hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
         objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        matrix = _sparse(self.free_matrix())
+        matrix = _sparse(self.free)
         along, across, rest = self._nonlinear(axes, data)
         g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
@@ -133,14 +133,13 @@ class Model(Layout):
         curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
         self._function = _Buffered(self._make_solver(nlp, curvature))
         self._qp = _quadratic_program("presolve", hessian, matrix)
-        self._linear_count = matrix.shape[0]
         self._compile_elastic()
 
     def _compile_elastic(self) -> None:
         """The QP in which all obstacle rows give way by the same, smallest possible amount."""
         import casadi as ca
 
-        matrix = self.free_matrix()
+        matrix = self.free
         owner = np.repeat([rows.family == "obstacles" for rows in self.linear], [len(k) for k in self.kept])
         self._soft = np.flatnonzero(owner)
         count, m = matrix.shape
@@ -166,7 +165,7 @@ class Model(Layout):
             By how much [m] the obstacle rows are missed. None instead of both if even the other rows
             contradict each other.
         """
-        rows = self._linear_count
+        rows = self.linear_count
         low, upper = low[:rows], high[:rows].copy()
         upper[self._soft] = np.inf
         lba = np.concatenate((low, np.full(len(self._soft), -np.inf)))
@@ -240,7 +239,7 @@ class Model(Layout):
         possible : bool
             False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
-        rows = self._linear_count
+        rows = self.linear_count
         with self._lock:
             out = self._qp(g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
             word = int(self._qp.stats()["return_status"])
@@ -257,12 +256,12 @@ class Model(Layout):
         ----------
         x0 : (m,) array
             Initial guess of the unknowns.
-        data : (S, 8) array
+        data : (8, S) array
             See :data:`SAMPLED`.
         slope : (m,) array
             Linear part of the objective.
         low, high : (R,) array
-            Bounds of all rows, see :meth:`bounds`.
+            Bounds of all rows: the linear ones, then the nonlinear ones.
         deadline : float or None
             ``time.perf_counter()`` at which to stop; needs ``timed``.
         """
@@ -270,7 +269,7 @@ class Model(Layout):
             if self._deadline is not None:
                 self._deadline.at = deadline if deadline is not None else float("inf")
             try:
-                out = self._function(x0=x0, p=np.concatenate((data.T.ravel(), slope)), lbg=low, ubg=high)
+                out = self._function(x0=x0, p=np.concatenate((data.ravel(), slope)), lbg=low, ubg=high)
             except RuntimeError as error:
                 return Solution(x0, _last_line(error), 0, np.inf)
             x, g = out["x"].copy(), out["g"]

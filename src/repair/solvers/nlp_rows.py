@@ -146,6 +146,14 @@ class Layout:
         The linear rows by family; ``obstacles`` of l include the road.
     kept : list of int arrays
         For each of them, the rows that the unknowns can move.
+    free : (L, m) array
+        All linear rows that the unknowns can move, over the unknowns; the direction of travel last.
+    given : (L, 2 p) array
+        The same rows over the given control points, s first.
+    spans : list of slices
+        Where in those rows each item of ``linear`` is.
+    evaluated : (E, n) array
+        ``velocity``, ``acceleration``, ``jerk``, ``obstacle`` and ``samples`` on top of each other.
     """
 
     def __init__(self, structure: Structure) -> None:
@@ -168,6 +176,14 @@ class Layout:
         self._quadratic()
         self.linear = self._linear_rows()
         self.kept = [np.flatnonzero(np.abs(r.matrix[:, p:]).max(axis=1) > 1e-12) for r in self.linear]
+        self._over_unknowns()
+        parts = (self.velocity, self.acceleration, self.jerk, self.obstacle)
+        self.evaluated = np.vstack((*parts, *self.samples))
+        self.family_start = np.cumsum([0, *(len(part) for part in parts)])
+        self.sampled_given = np.vstack(self.samples)[:, :p]
+        self.edge = np.arange(segments * s.windows + 1) * (h / s.windows)
+        self.fraction = np.arange(p + 1) / p
+        self.window_row = np.arange(segments * s.windows)[:, None] * p + np.arange(p + 1)
 
     def _quadratic(self) -> None:
         """Exact integrals of the squared derivatives and of the squared distance (Gauss-Legendre)."""
@@ -201,42 +217,24 @@ class Layout:
             ]
         return rows
 
-    def free_matrix(self) -> Array:
-        """All linear rows that the unknowns can move, over the unknowns; the direction of travel last."""
+    def _over_unknowns(self) -> None:
+        """The linear rows over the unknowns and over the given control points."""
         s, p = self.structure, self.structure.degree
-        m = s.n - p
-        blocks = []
+        free, given, first = [], [], 0
+        self.spans: list[slice] = []
         for rows, kept in zip(self.linear, self.kept, strict=True):
-            block = np.zeros((len(kept), m * s.axes))
-            block[:, rows.axis * m : (rows.axis + 1) * m] = rows.matrix[kept][:, p:]
-            blocks.append(block)
+            picked, own = rows.matrix[kept], np.arange(s.axes) == rows.axis
+            free.append(np.kron(own, picked[:, p:]))
+            given.append(np.kron(np.arange(2) == rows.axis, picked[:, :p]))
+            self.spans.append(slice(first, first + len(kept)))
+            first += len(kept)
         if s.lateral:
-            free = self.velocity[self.kept[0]][:, p:]
-            blocks += [np.hstack([s.tangent * free, sign * free]) for sign in (-1.0, 1.0)]
-        return np.vstack(blocks)
-
-    def bounds(self, head: Array, lower: list[Array], upper: list[Array]) -> tuple[Array, Array]:
-        """Bounds of the rows that the unknowns can move, the given points' share taken off.
-
-        Parameters
-        ----------
-        head : (p, 2) array
-            The given control points.
-        lower, upper : list of arrays
-            Of the rows of :attr:`linear` in order, then of the nonlinear ones.
-        """
-        p, count = self.structure.degree, len(self.linear)
-        low, high = [], []
-        for rows, kept, below, above in zip(self.linear, self.kept, lower, upper, strict=False):
-            share = rows.matrix[kept][:, :p] @ head[:, rows.axis]
-            low.append(below[kept] - share)
-            high.append(above[kept] - share)
-        if self.structure.lateral:
-            given = self.velocity[self.kept[0]][:, :p] @ head
+            moving = self.velocity[self.kept[0]]
             for sign in (-1.0, 1.0):
-                low.append(-(self.structure.tangent * given[:, 0] + sign * given[:, 1]))
-                high.append(np.full(len(given), np.inf))
-        return np.concatenate(low + lower[count:]), np.concatenate(high + upper[count:])
+                free.append(np.kron([s.tangent, sign], moving[:, p:]))
+                given.append(np.kron([s.tangent, sign], moving[:, :p]))
+        self.free, self.given = np.vstack(free), np.vstack(given)
+        self.linear_count = len(self.free)
 
     def unknowns(self, points: Array) -> Array:
         """The unknowns (m,) among control points (n, 2)."""

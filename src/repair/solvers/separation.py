@@ -170,11 +170,10 @@ def _edges(problem: RepairProblem, windows: Windows) -> tuple[Array, Array, npt.
     edge[..., 1:3] = upper
     np.negative(lower[..., 1], out=edge[..., 3])
     edge = edge.reshape(len(lower), *knots.shape, 4).swapaxes(0, 1)  # (K, N, W, 4)
-    present = np.isfinite(edge)
+    present = np.asarray(np.isfinite(edge).all(axis=-1))
     all_there = bool(present.all())
     first = edge[0, :, 0]
     if not all_there:
-        present = present.all(axis=-1)
         first = np.where(present[0, :, 0, None], first, np.nan)
         # There for a part: as far as it ever gets, throughout.
         edge = np.where(present[..., None], edge, -np.inf)
@@ -189,7 +188,7 @@ def _edges(problem: RepairProblem, windows: Windows) -> tuple[Array, Array, npt.
             cover += np.maximum((edge - (edge[0] + rise * where)).max(axis=0), 0.0)
     if all_there:
         return cover, first, np.ones(cover.shape[1:3], dtype=np.bool_)
-    some = present.any(axis=0)
+    some = np.asarray(present.any(axis=0))
     cover[:, ~some] = -np.inf
     if width > 0.0:
         # Only there at one end: that instant alone.
