@@ -21,7 +21,8 @@ over s enter as lines around the last path; the NLP is solved again around its o
 trust region, until the exact values agree.
 
 The convex QP of all linear constraints is solved first, by daqp. Where it has no solution there is
-none, and with s alone and no bend in the way its solution is the answer already.
+none; where, with s alone, its solution keeps the friction circle as well, ``sqpmethod`` would only
+confirm it and is not asked.
 """
 
 from __future__ import annotations
@@ -39,12 +40,14 @@ from repair.solvers.nlp_instance import ROAD_SLACK, TOLERANCE, Instance
 from repair.solvers.nlp_model import Model, Solution, build_model
 from repair.solvers.nlp_rows import Structure
 from repair.solvers.separation import Separation, separate
-from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, SolveResult, SolveStatus, frozen
+from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, Side, SolveResult, SolveStatus, frozen
 
 __all__ = ["CasadiBackend", "make"]
 
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
 _SIDES = 4  # sets of sides that are tried
+# On which sides of an obstacle the lower and the upper bounds of s and l are.
+_SIDE_OF = ((Side.AHEAD, Side.BEHIND), (Side.LEFT, Side.RIGHT))
 
 _STATUS = {
     "Solve_Succeeded": SolveStatus.SOLVED,
@@ -187,7 +190,16 @@ class CasadiBackend:
         separation, points, why, closest = self._open(instance, points)
         if why:
             return self._infeasible(instance, why, closest)
-        points = self._warmer(instance, separation, points, warm_start)
+        residuals = instance.residuals(separation, points)
+        if _answered(instance, points, residuals):
+            return SolveResult(
+                SolveStatus.SOLVED,
+                self._curve(instance, points),
+                instance.objective(points),
+                detail="the optimum of the linear rows keeps the others too",
+                residuals=residuals,
+            )
+        points = self._warmer(instance, separation, points, residuals, warm_start)
         iterations = 0
         for round_ in range(self.config.rounds):
             trust = _TRUST * 0.5**round_ if round_ else None
@@ -214,11 +226,14 @@ class CasadiBackend:
             detail = f"time limit of {time_limit:g} s"
         elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
             detail = f"{word}; at the last iterate {_worst(residuals)}"
-        curve = None
-        if kept and status is not SolveStatus.INFEASIBLE:
-            curve = UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(points + instance.origin))
+        usable = kept and status is not SolveStatus.INFEASIBLE
+        curve = self._curve(instance, points) if usable else None
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
+
+    def _curve(self, instance: Instance, points: Array) -> UniformBSpline:
+        t_rep = instance.problem.t_rep
+        return UniformBSpline(t_rep, self.spacing, self.degree, frozen(points + instance.origin))
 
     def _infeasible(
         self, instance: Instance, why: str, closest: tuple[Array, dict[str, float]] | None
@@ -226,8 +241,7 @@ class CasadiBackend:
         """No solution; with the curve, if any, that keeps all other linear rows and comes closest."""
         if closest is None:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
-        points = frozen(closest[0] + instance.origin)
-        curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, points)
+        curve = self._curve(instance, closest[0])
         return SolveResult(
             SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve}
         )
@@ -262,11 +276,11 @@ class CasadiBackend:
             gap = _gap(separation)
             why = why or gap
             low, high = instance.bounds(separation, None)
-            x, feasible = model.unknowns(points), not gap
-            if feasible:
-                x, feasible = model.presolve(x, slope, low, high)
-            if feasible:
-                return separation, model.with_unknowns(points, x), "", closest
+            x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
+            if x is not None:
+                points = instance.relaxed = model.with_unknowns(points, x)
+            if possible:
+                return separation, points, "", closest
             modest = instance.bounds(separation, None, modest=True)
             elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
             if elastic is None:
@@ -281,18 +295,25 @@ class CasadiBackend:
         return separation, points, why, closest
 
     def _warmer(
-        self, instance: Instance, separation: Separation, points: Array, warm_start: Curve | None
+        self,
+        instance: Instance,
+        separation: Separation,
+        points: Array,
+        residuals: dict[str, float],
+        warm_start: Curve | None,
     ) -> Array:
         """The neighbouring probe's curve instead of ``points`` where it violates less."""
         if warm_start is None or warm_start.t_start > instance.problem.t_rep + 1e-9:
+            return points
+        worst = max(residuals.values())
+        if worst <= 0.0:
             return points
         model, t_rep = instance.model, instance.problem.t_rep
         shifted = (
             fit_to_curve(warm_start, t_rep, len(points), self.degree, self.spacing).points - instance.origin
         )
         warm = model.with_unknowns(points, model.unknowns(shifted))
-        worst = [max(instance.residuals(separation, p).values()) for p in (warm, points)]
-        return warm if worst[0] < worst[1] else points
+        return warm if max(instance.residuals(separation, warm).values()) < worst else points
 
     def _run(
         self, instance: Instance, points: Array, low: Array, high: Array, deadline: float | None
@@ -321,6 +342,16 @@ def _status(model: Model, solution: Solution) -> SolveStatus:
     return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
 
 
+def _answered(instance: Instance, points: Array, residuals: dict[str, float]) -> bool:
+    """Whether the optimum of the linear rows keeps the nonlinear ones too, and so is the NLP's.
+
+    Only where there are few enough of those to look at (s alone); IPOPT is left to find its own.
+    """
+    if points is not instance.relaxed or instance.model.structure.solver != "sqpmethod":
+        return False
+    return not instance.problem.lateral and max(residuals.values()) <= 0.0 and instance.keeps_circle(points)
+
+
 def _require(problem: RepairProblem) -> None:
     if not problem.t_end - problem.t_rep > 1e-9:
         raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
@@ -331,13 +362,13 @@ def _require(problem: RepairProblem) -> None:
 def _missed(instance: Instance, separation: Separation, points: Array, miss: float) -> str:
     """The obstacle that is missed by the most, as a sentence."""
     position = instance.model.obstacle @ points + instance.origin
-    depth = np.stack([separation.lower - position, position - separation.upper])
+    depth = np.array((separation.lower - position, position - separation.upper))
     row = int(np.argmax(np.max(depth, axis=(0, 2)) > 0.99 * miss - 1e-6))
     end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
-    who = (separation.lower_by, separation.upper_by)[int(end)][row, axis]
+    side = _SIDE_OF[int(axis)][int(end)]
     return (
         f"passing as the guide does, every curve within the limits comes at least {miss:.2f} m too close to "
-        f"{separation.who(who)} (t = {separation.times[row]:.2f} s)"
+        f"{separation.who(row, side)} (t = {separation.times[row]:.2f} s)"
     )
 
 
@@ -347,9 +378,9 @@ def _gap(separation: Separation) -> str:
     if not closed.any():
         return ""
     row, axis = (int(i[0]) for i in np.nonzero(closed))
-    below, above = separation.lower_by[row, axis], separation.upper_by[row, axis]
+    below, above = (separation.who(row, side) for side in _SIDE_OF[axis])
     t = separation.times[row]
-    return f"{separation.who(below)} and {separation.who(above)} leave no gap at t = {t:.2f} s"
+    return f"{below} and {above} leave no gap at t = {t:.2f} s"
 
 
 def _worst(residuals: dict[str, float]) -> str:

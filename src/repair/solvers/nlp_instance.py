@@ -60,6 +60,7 @@ class Instance:
     def __init__(self, problem: RepairProblem, model: Model, origin: Array, head: Array) -> None:
         self.problem, self.model, self.origin, self.head = problem, model, origin, head
         self.windows = self._windows()
+        self.relaxed: Array | None = None  # the optimum of the linear rows, once it is known
         # The given points' share of the linear rows, and of the samples' states.
         self.given = model.given @ head.T.ravel()
         self.state_given = (model.sampled_given @ head).reshape(3, -1, 2)
@@ -138,6 +139,10 @@ class Instance:
             low[span], high[span] = -limits.curvature, limits.curvature
         return low, high
 
+    @cached_property
+    def _modest(self) -> tuple[Array, Array]:
+        return self._limit_bounds(modest=True)
+
     def bounds(
         self, separation: Separation, around: Array | None, trust: float | None = None, modest: bool = False
     ) -> tuple[Array, Array]:
@@ -148,7 +153,8 @@ class Instance:
         friction circle that the nonlinear rows use, for a solution that is sought without those rows.
         """
         model = self.model
-        low, high = self._limit_bounds(modest=True) if modest else (self.lower.copy(), self.upper.copy())
+        base = self._modest if modest else (self.lower, self.upper)
+        low, high = base[0].copy(), base[1].copy()
         for rows, kept, span in zip(model.linear, model.kept, model.spans, strict=True):
             if rows.family != "obstacles":
                 continue

@@ -229,13 +229,13 @@ class Model(Layout):
             }  # fmt: skip
         return ca.nlpsol("repair", s.solver, nlp, options)
 
-    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array, bool]:
+    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array | None, bool]:
         """The convex QP of the objective and the linear rows alone.
 
         Returns
         -------
-        x : array
-            Its solution, or ``x0`` where it has none.
+        x : array or None
+            Its solution, where daqp has found one.
         possible : bool
             False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
@@ -245,7 +245,7 @@ class Model(Layout):
             word = int(self._qp.stats()["return_status"])
             if word > 0:
                 return out["x"].copy(), True
-        return x0, word != _DAQP_INFEASIBLE
+        return None, word != _DAQP_INFEASIBLE
 
     def solve(
         self, x0: Array, data: Array, slope: Array, low: Array, high: Array, deadline: float | None

@@ -109,30 +109,21 @@ class Separation:
         times[self.windows.row] = self.windows.moment
         return times
 
-    @cached_property
-    def owners(self) -> npt.NDArray[np.int64]:
-        """Whom the bounds (R, 4) of the sides come from: an obstacle's id, NOBODY or ROAD."""
-        bounds = np.stack([-self.upper[:, 0], self.lower[:, 0], self.lower[:, 1], -self.upper[:, 1]], axis=1)
-        owners = np.where(np.isfinite(bounds) & (_AXIS == 1), ROAD, NOBODY)
+    def owner(self, row: int, side: int) -> int:
+        """Whom a row's bound on a side comes from: an obstacle's id, NOBODY or ROAD."""
+        bound = (-self.upper[row, 0], self.lower[row, 0], self.lower[row, 1], -self.upper[row, 1])[side]
+        if not np.isfinite(bound):
+            return NOBODY
         if self.claims is not None:
-            for point, row in zip(self.claims, self.windows.row.T, strict=True):
-                for number, claim in zip(self.ids, point, strict=True):
-                    own = np.isfinite(claim) & (claim == bounds[row])
-                    owners[row] = np.where(own, number, owners[row])
-        return owners
+            window, point = np.nonzero(self.windows.row == row)
+            own = np.flatnonzero((self.claims[point, :, window, side] == bound).any(axis=0))
+            if len(own):
+                return int(self.ids[own[-1]])
+        return ROAD
 
-    @property
-    def lower_by(self) -> npt.NDArray[np.int64]:
-        """Owners (R, 2) of the lower bounds."""
-        return self.owners[:, 1:3]
-
-    @property
-    def upper_by(self) -> npt.NDArray[np.int64]:
-        """Owners (R, 2) of the upper bounds."""
-        return self.owners[:, ::3]
-
-    def who(self, number: int) -> str:
+    def who(self, row: int, side: int) -> str:
         """Name of the owner of a bound."""
+        number = self.owner(row, side)
         return "the edge of the road" if number == ROAD else f"obstacle {number}"
 
 
