@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from repair.solvers.nlp_model import SAMPLED, STANDSTILL, Model
+from repair.solvers.nlp_rows import FAMILIES
 from repair.solvers.separation import Boxes, Separation, Windows, boxes_in, road_room
 from repair.types import Array, RepairProblem
 
@@ -19,7 +20,7 @@ _FRICTION = 0.995  # share of the friction circle used at the samples, for what 
 _EDGE = 0.05  # [m] kept from the edge of the road
 _OWN = 0.05  # [m] by which the body's ends may always leave the axis' own
 _INF = np.inf
-_ORDER = {"velocity": 0, "acceleration": 1, "jerk": 2}
+_MODEST = np.where(np.isin(np.arange(12), (2, 3)), _FRICTION, 1.0)  # for the rows of the accelerations
 
 
 _STEP = 0.25  # [m] of s either way for the slope of the axis' curvature
@@ -108,35 +109,24 @@ class Instance:
         )
 
     @cached_property
-    def _limit_table(self) -> tuple[Array, Array]:
-        """Smallest and largest velocity, acceleration, jerk (3, 2)."""
+    def _limit_values(self) -> tuple[Array, Array]:
+        """Smallest and largest value of every kind of row, in the order of ``Layout.kind``."""
         c = self.problem.limits
-        low = np.array([[0.0, -c.v_lat], [c.a_min, -c.a_lat], [-c.j_lon, -c.j_lat]])
-        high = np.array([[c.v_max, c.v_lat], [c.a_max, c.a_lat], [c.j_lon, c.j_lat]])
-        return low, high
+        side = c.a_lat if c.a_lat < c.a_total - 1e-9 else _INF
+        low = [0.0, -c.v_lat, c.a_min, -c.a_lat, -c.j_lon, -c.j_lat]
+        high = [c.v_max, c.v_lat, c.a_max, c.a_lat, c.j_lon, c.j_lat]
+        low += [-_INF, 0.0, -_INF, -side, c.a_min, -c.curvature]
+        high += [_INF, _INF, (_FRICTION * c.a_total) ** 2, side, c.a_max, c.curvature]
+        return np.array(low), np.array(high)
 
     def _limit_bounds(self, modest: bool = False) -> tuple[Array, Array]:
         """Bounds of all rows; those of the position rows and the body's ends are filled in later."""
-        model, limits, (least, most) = self.model, self.problem.limits, self._limit_table
-        rows, count = model.linear_count, len(model.tau)
-        blocks = 6 if self.problem.lateral else 2
-        low, high = np.full(rows + blocks * count, -_INF), np.full(rows + blocks * count, _INF)
-        for item, span in zip(model.linear, model.spans, strict=True):
-            if item.family != "obstacles":
-                order = _ORDER[item.family]
-                share = _FRICTION if modest and order == 1 else 1.0
-                low[span], high[span] = share * least[order, item.axis], share * most[order, item.axis]
-        low[model.spans[-1].stop : rows] = 0.0  # the direction of travel
-        low[:rows] -= self.given
-        high[:rows] -= self.given
-        across = limits.a_lat if limits.a_lat < limits.a_total - 1e-9 else _INF
-        high[rows : rows + count] = (_FRICTION * limits.a_total) ** 2
-        low[rows + count : rows + 2 * count], high[rows + count : rows + 2 * count] = -across, across
-        if self.problem.lateral:
-            span = slice(rows + 2 * count, rows + 3 * count)
-            low[span], high[span] = limits.a_min, limits.a_max
-            span = slice(rows + 3 * count, rows + 4 * count)
-            low[span], high[span] = -limits.curvature, limits.curvature
+        model, (least, most) = self.model, self._limit_values
+        if modest:
+            least, most = least * _MODEST, most * _MODEST
+        low, high = least[model.kind], most[model.kind]
+        low[: model.linear_count] -= self.given
+        high[: model.linear_count] -= self.given
         return low, high
 
     @cached_property
@@ -155,14 +145,11 @@ class Instance:
         model = self.model
         base = self._modest if modest else (self.lower, self.upper)
         low, high = base[0].copy(), base[1].copy()
-        for rows, kept, span in zip(model.linear, model.kept, model.spans, strict=True):
-            if rows.family != "obstacles":
-                continue
-            shift = self.given[span] + self.origin[rows.axis]
-            lower = separation.lower[kept, rows.axis] - shift
-            upper = separation.upper[kept, rows.axis] - shift
-            if trust is not None and around is not None and rows.axis == 0:
-                here = (rows.matrix @ around[:, 0])[kept] - self.given[span]
+        for axis, kept, span in model.bounded:
+            shift = self.given[span] + self.origin[axis]
+            lower, upper = separation.lower[kept, axis] - shift, separation.upper[kept, axis] - shift
+            if trust is not None and around is not None and axis == 0:
+                here = (model.obstacle @ around[:, 0])[kept] - self.given[span]
                 lower = np.maximum(lower, np.minimum(here - trust, upper))
                 upper = np.minimum(upper, np.maximum(here + trust, lower))
             low[span], high[span] = lower, upper
@@ -250,11 +237,9 @@ class Instance:
         return right, left
 
     @cached_property
-    def _row_limits(self) -> tuple[Array, Array]:
+    def _row_limits(self) -> tuple[Array, ...]:
         """Bounds (R, 2) of velocity, acceleration and jerk at all of their Bernstein points."""
-        counts = np.diff(self.model.family_start)[:-1]
-        least, most = self._limit_table
-        return np.repeat(least, counts, axis=0), np.repeat(most, counts, axis=0)
+        return tuple(side[:6].reshape(3, 2)[self.model.order] for side in self._limit_values)
 
     def residuals(self, separation: Separation, points: Array) -> dict[str, float]:
         """Largest violation of every family, from the control points and the problem alone."""
@@ -269,7 +254,7 @@ class Instance:
         axes = model.structure.axes
         worst = [*derivatives[:, :axes].max(axis=1).tolist(), float(depth[:axes].max())]
         # What is not a number stays one: max() keeps its first argument then.
-        found = {family: max(x, 0.0) for family, x in zip((*_ORDER, "obstacles"), worst, strict=True)}
+        found = {family: max(x, 0.0) for family, x in zip(FAMILIES, worst, strict=True)}
         if problem.lateral:
             v = value[: first[1]]
             found["heading"] = max(float((np.abs(v[:, 1]) - model.structure.tangent * v[:, 0]).max()), 0.0)

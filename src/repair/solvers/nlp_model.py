@@ -122,15 +122,17 @@ class Model(Layout):
         along, across, rest = self._nonlinear(axes, data)
         g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
-        # For SQP: the objective's own Hessian and the friction circles' J'J, positive definite always.
-        factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
-        circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
-        bent = factor * hessian
-        for part in (along, across):
-            slope_of = ca.jacobian(part, x)
-            bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
-        names = ["x", "p", "lam_f", "lam_g"]
-        curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
+        curvature = None
+        if s.solver != "ipopt":
+            # The objective's own Hessian and the friction circles' J'J, positive definite always.
+            factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
+            circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
+            bent = factor * hessian
+            for part in (along, across):
+                slope_of = ca.jacobian(part, x)
+                bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
+            names = ["x", "p", "lam_f", "lam_g"]
+            curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
         self._function = _Buffered(self._make_solver(nlp, curvature))
         self._qp = _quadratic_program("presolve", hessian, matrix)
         self._compile_elastic()

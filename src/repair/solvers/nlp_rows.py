@@ -13,11 +13,15 @@ from functools import lru_cache
 from math import comb
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.bspline import basis_matrix, derivative_matrix, segment_matrix
 from repair.types import Array, frozen
 
-__all__ = ["Layout", "Rows", "Structure", "bernstein_rows"]
+__all__ = ["FAMILIES", "Layout", "Rows", "Structure", "bernstein_rows"]
+
+
+FAMILIES = ("velocity", "acceleration", "jerk", "obstacles")
 
 
 @dataclass(frozen=True)
@@ -150,8 +154,14 @@ class Layout:
         All linear rows that the unknowns can move, over the unknowns; the direction of travel last.
     given : (L, 2 p) array
         The same rows over the given control points, s first.
-    spans : list of slices
-        Where in those rows each item of ``linear`` is.
+    bounded : list of tuples
+        Axis, ``kept`` and place in those rows of each axis' obstacle rows.
+    kind : int array
+        What bounds each row, the nonlinear ones included: 0 to 5 velocity, acceleration, jerk of s and
+        l; 6 nothing that is known beforehand; 7 the direction of travel; 8 the friction circle; 9, 10
+        the accelerations across and along; 11 the path's curvature.
+    order : int array
+        0 to 2 for the rows of ``evaluated`` that are velocities, accelerations, jerks.
     evaluated : (E, n) array
         ``velocity``, ``acceleration``, ``jerk``, ``obstacle`` and ``samples`` on top of each other.
     """
@@ -180,6 +190,7 @@ class Layout:
         parts = (self.velocity, self.acceleration, self.jerk, self.obstacle)
         self.evaluated = np.vstack((*parts, *self.samples))
         self.family_start = np.cumsum([0, *(len(part) for part in parts)])
+        self.order = np.repeat(np.arange(3), [len(part) for part in parts[:3]])
         self.sampled_given = np.vstack(self.samples)[:, :p]
         self.edge = np.arange(segments * s.windows + 1) * (h / s.windows)
         self.fraction = np.arange(p + 1) / p
@@ -220,21 +231,26 @@ class Layout:
     def _over_unknowns(self) -> None:
         """The linear rows over the unknowns and over the given control points."""
         s, p = self.structure, self.structure.degree
-        free, given, first = [], [], 0
-        self.spans: list[slice] = []
+        free, given = [], []
+        kind: list[int] = []
+        self.bounded: list[tuple[int, npt.NDArray[np.intp], slice]] = []
         for rows, kept in zip(self.linear, self.kept, strict=True):
-            picked, own = rows.matrix[kept], np.arange(s.axes) == rows.axis
-            free.append(np.kron(own, picked[:, p:]))
+            picked, place = rows.matrix[kept], FAMILIES.index(rows.family)
+            if rows.family == "obstacles":
+                self.bounded.append((rows.axis, kept, slice(len(kind), len(kind) + len(kept))))
+            free.append(np.kron(np.arange(s.axes) == rows.axis, picked[:, p:]))
             given.append(np.kron(np.arange(2) == rows.axis, picked[:, :p]))
-            self.spans.append(slice(first, first + len(kept)))
-            first += len(kept)
+            kind += [6 if rows.family == "obstacles" else 2 * place + rows.axis] * len(kept)
         if s.lateral:
             moving = self.velocity[self.kept[0]]
             for sign in (-1.0, 1.0):
                 free.append(np.kron([s.tangent, sign], moving[:, p:]))
                 given.append(np.kron([s.tangent, sign], moving[:, :p]))
+            kind += [7] * (2 * len(moving))
         self.free, self.given = np.vstack(free), np.vstack(given)
         self.linear_count = len(self.free)
+        nonlinear = (8, 9, 10, 11, 6, 6) if s.lateral else (8, 9)
+        self.kind = np.concatenate((kind, np.repeat(nonlinear, len(self.tau)))).astype(np.intp)
 
     def unknowns(self, points: Array) -> Array:
         """The unknowns (m,) among control points (n, 2)."""
