@@ -226,6 +226,24 @@ def test_the_model_is_built_once():
     assert again.status is SolveStatus.SOLVED
 
 
+def test_the_nlp_is_made_when_it_is_first_solved():
+    """Its time is building time, and what CasADi says against it then is a status too."""
+    backend = CasadiBackend(CasadiConfig(solver="sqpmethod"), spacing=0.29)
+    straight = toy.problem([], lateral=False, t_end=5.0)
+    model = build_model(backend._structure(straight, False))
+    assert backend.solve(straight).status is SolveStatus.SOLVED
+    assert "_function" not in vars(model)
+    first, again = backend.solve(bend()), backend.solve(bend())
+    assert "_function" in vars(model)
+    assert again.build_time < 0.5 * first.build_time
+    config = CasadiConfig(solver="sqpmethod", max_iterations=77)
+    model = build_model(CasadiBackend(config, spacing=0.29)._structure(straight, False))
+    model._compile = lambda: (_ for _ in ()).throw(RuntimeError("first line\nno licence"))
+    refused = CasadiBackend(config, spacing=0.29).solve(bend())
+    assert refused.status is SolveStatus.UNAVAILABLE
+    assert "no licence" in refused.detail
+
+
 def test_iteration_limit():
     config = CasadiConfig(solver="ipopt", max_iterations=1)
     result = CasadiBackend(config).solve(bend())

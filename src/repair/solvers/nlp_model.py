@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -93,20 +93,42 @@ class _Buffered:
 
 
 class Model(Layout):
-    """One NLP: its constant matrices, and the functions that solve it."""
+    """One NLP: its constant matrices, and the functions that solve it.
+
+    The NLP itself is made when it is first solved: many problems end before, with the linear rows.
+    ``build_time`` is what has been spent on making functions so far [s].
+    """
 
     def __init__(self, structure: Structure) -> None:
+        import casadi as ca
+
         begin = time.perf_counter()
         super().__init__(structure)
         self._deadline: _Deadline | None = None
         self._lock = threading.Lock()  # models are shared, and so are their buffers
+        p = structure.degree
+        self._hessian = ca.DM(np.kron(np.eye(structure.axes), self.hessian[p:, p:]))
+        self._matrix = _sparse(self.free)
         try:
-            self._compile()
+            if not ca.has_nlpsol(structure.solver):
+                ca.load_nlpsol(structure.solver)  # says why it cannot
+            self._qp = _quadratic_program("presolve", self._hessian, self._matrix)
+            self._compile_elastic()
         except RuntimeError as error:
-            raise BackendError(f"CasADi cannot make the solver: {_last_line(error)}") from error
+            raise _unavailable(error) from error
         self.build_time = time.perf_counter() - begin
 
-    def _compile(self) -> None:
+    @cached_property
+    def _function(self) -> _Buffered:
+        begin = time.perf_counter()
+        try:
+            return _Buffered(self._compile())
+        except RuntimeError as error:
+            raise _unavailable(error) from error
+        finally:
+            self.build_time += time.perf_counter() - begin
+
+    def _compile(self) -> Any:
         import casadi as ca
 
         s, p = self.structure, self.structure.degree
@@ -115,10 +137,9 @@ class Model(Layout):
         count = len(self.tau)
         data = ca.SX.sym("data", count, SAMPLED)
         slope = ca.SX.sym("slope", m * s.axes)
-        hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
+        hessian, matrix = self._hessian, self._matrix
         objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        matrix = _sparse(self.free)
         along, across, rest = self._nonlinear(axes, data)
         g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
@@ -133,9 +154,7 @@ class Model(Layout):
                 bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
             names = ["x", "p", "lam_f", "lam_g"]
             curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
-        self._function = _Buffered(self._make_solver(nlp, curvature))
-        self._qp = _quadratic_program("presolve", hessian, matrix)
-        self._compile_elastic()
+        return self._make_solver(nlp, curvature)
 
     def _compile_elastic(self) -> None:
         """The QP in which all obstacle rows give way by the same, smallest possible amount."""
@@ -266,18 +285,24 @@ class Model(Layout):
             Bounds of all rows: the linear ones, then the nonlinear ones.
         deadline : float or None
             ``time.perf_counter()`` at which to stop; needs ``timed``.
+
+        Raises
+        ------
+        BackendError
+            If CasADi cannot make the solver.
         """
         with self._lock:
+            function = self._function
             if self._deadline is not None:
                 self._deadline.at = deadline if deadline is not None else float("inf")
             try:
-                out = self._function(x0=x0, p=np.concatenate((data.ravel(), slope)), lbg=low, ubg=high)
+                out = function(x0=x0, p=np.concatenate((data.ravel(), slope)), lbg=low, ubg=high)
             except RuntimeError as error:
                 return Solution(x0, _last_line(error), 0, np.inf)
             x, g = out["x"].copy(), out["g"]
             violation = float(np.maximum(low - g, g - high).max(initial=0.0))
             try:
-                stats = self._function.stats()
+                stats = function.stats()
             except RuntimeError:  # sqpmethod has no word for a QP that fails
                 return Solution(x, "QP_Failed", 0, violation)
         return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
@@ -339,6 +364,10 @@ def _sparse(matrix: Array) -> Any:
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
 
 
+def _unavailable(error: Exception) -> BackendError:
+    return BackendError(f"CasADi cannot make the solver: {_last_line(error)}")
+
+
 def _last_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__
@@ -346,5 +375,5 @@ def _last_line(error: Exception) -> str:
 
 @lru_cache(maxsize=256)
 def build_model(structure: Structure) -> Model:
-    """The model of a structure; built at the first call, kept after that."""
+    """The model of a structure; made at the first call, kept after that."""
     return Model(structure)
