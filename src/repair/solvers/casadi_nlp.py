@@ -194,13 +194,9 @@ class CasadiBackend:
             return self._infeasible(instance, why, closest)
         residuals = instance.residuals(separation, points)
         if _answered(instance, points, residuals):
-            return SolveResult(
-                SolveStatus.SOLVED,
-                self._curve(instance, points),
-                instance.objective(points),
-                detail="the optimum of the linear rows keeps the others too",
-                residuals=residuals,
-            )
+            word = "the optimum of the linear rows keeps the others too"
+            found, cost = self._curve(instance, points), instance.objective(points)
+            return SolveResult(SolveStatus.SOLVED, found, cost, detail=word, residuals=residuals)
         points = self._warmer(instance, separation, points, residuals, warm_start)
         iterations = 0
         for round_ in range(self.config.rounds):
