@@ -15,7 +15,7 @@ from repair.scene.frame import FrenetFrame
 from repair.solvers import nlp_instance, nlp_model
 from repair.solvers.casadi_nlp import CasadiBackend
 from repair.solvers.nlp_model import build_model
-from repair.solvers.separation import ROAD, Windows, road_room, separate
+from repair.solvers.separation import NOBODY, ROAD, Windows, road_room, separate
 from repair.types import LateralBounds, Side, SolveStatus, frozen
 
 INF = np.inf
@@ -34,6 +34,10 @@ def separated(problem, side, w=None, room=None):
     return separate(problem, w, int(w.row.max()) + 1, shape, room, sides)
 
 
+def owners(found, side):
+    return {found.owner(row, side) for row in range(len(found.lower))}
+
+
 # -- separation ------------------------------------------------------------------------------------
 
 
@@ -41,7 +45,7 @@ def test_a_linear_edge_is_taken_over_exactly():
     problem = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(3.0, 0.0))], lateral=False)
     found = separated(problem, Side.BEHIND)
     np.testing.assert_allclose(found.upper[:, 0], 20.0 + 3.0 * found.times - 0.1, atol=1e-9)
-    assert (found.upper_by[:, 0] == 100).all()
+    assert owners(found, Side.BEHIND) == {100}
     assert np.isinf(found.lower).all()
     assert np.isinf(found.upper[:, 1]).all()
 
@@ -97,7 +101,7 @@ def test_the_tightest_of_two_wins_and_is_named():
     boxes = [toy.box((30.0, 35.0), (-1.0, 1.0)), toy.box((20.0, 25.0), (-1.0, 1.0))]
     found = separated(toy.problem(boxes, lateral=False), Side.BEHIND)
     np.testing.assert_allclose(found.upper[:, 0], 19.9)
-    assert (found.upper_by[:, 0] == 101).all()
+    assert owners(found, Side.BEHIND) == {101}
 
 
 def test_obstacles_out_of_the_roads_reach_ask_for_nothing():
@@ -106,7 +110,8 @@ def test_obstacles_out_of_the_roads_reach_ask_for_nothing():
     found = separated(problem, Side.BEHIND, room=room)
     assert np.isinf(found.upper[:, 0]).all()
     np.testing.assert_allclose(found.upper[:, 1], 6.0)
-    assert (found.upper_by[:, 1] == ROAD).all()
+    assert owners(found, Side.RIGHT) == {ROAD}
+    assert owners(found, Side.BEHIND) == {NOBODY}
 
 
 def test_the_room_is_that_of_the_narrowest_place():
@@ -114,6 +119,22 @@ def test_the_room_is_that_of_the_narrowest_place():
     right, left = road_room(bounds, np.array([5.0, 12.0]), np.array([15.0, 14.0]), 0.0, 0.0, 0.0)
     np.testing.assert_allclose(right, [-1.0, -1.4])
     np.testing.assert_allclose(left, [2.5, 2.6])
+
+
+def test_the_narrowest_place_is_found_anywhere():
+    """Against a fine grid, before, within and beyond the table."""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        s = frozen(np.sort(rng.uniform(0.0, 30.0, 12)))
+        bounds = LateralBounds(s, frozen(rng.uniform(-4.0, -1.0, 12)), frozen(rng.uniform(1.0, 4.0, 12)))
+        low = rng.uniform(-5.0, 35.0, 8)
+        high = low + rng.choice([0.0, 0.1, 3.0, 20.0], 8)
+        right, left = road_room(bounds, low, high, 0.0, 0.0, 0.05)
+        for k in range(8):
+            fine = np.union1d(np.linspace(low[k], high[k], 200), s[(s >= low[k]) & (s <= high[k])])
+            most, least = bounds.at(fine)
+            np.testing.assert_allclose(right[k], min(most.max() + 0.05, 0.0))
+            np.testing.assert_allclose(left[k], max(least.min() - 0.05, 0.0))
 
 
 # -- the plane -------------------------------------------------------------------------------------
@@ -156,6 +177,26 @@ def test_it_slows_down_for_a_bend(solver):
     assert np.hypot(lateral, samples.acceleration[:, 0]).max() <= 8.0 + 1e-6
 
 
+def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_circle(monkeypatch):
+    """With s alone SQP is not asked on a straight road; it is in a bend, and IPOPT always is."""
+    asked, solve = [], nlp_model.Model.solve
+
+    def spy(self, *rest):
+        asked.append(self.structure.solver)
+        return solve(self, *rest)
+
+    monkeypatch.setattr(nlp_model.Model, "solve", spy)
+    straight = problems.guided(toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(4.0, 0.0))], lateral=False))
+    found = [CasadiBackend(CasadiConfig(solver=name)).solve(straight) for name in ("sqpmethod", "ipopt")]
+    assert asked == ["ipopt"]
+    assert [r.status for r in found] == [SolveStatus.SOLVED] * 2
+    assert found[1].objective > 1.0
+    np.testing.assert_allclose(found[0].objective, found[1].objective, rtol=1e-5)
+    np.testing.assert_allclose(found[0].curve.points, found[1].curve.points, atol=1e-3)
+    CasadiBackend(CasadiConfig(solver="sqpmethod")).solve(bend())
+    assert "sqpmethod" in asked
+
+
 # -- statuses --------------------------------------------------------------------------------------
 
 
@@ -183,6 +224,24 @@ def test_the_model_is_built_once():
     after = build_model.cache_info()
     assert after.misses == before.misses
     assert again.status is SolveStatus.SOLVED
+
+
+def test_the_nlp_is_made_when_it_is_first_solved():
+    """Its time is building time, and what CasADi says against it then is a status too."""
+    backend = CasadiBackend(CasadiConfig(solver="sqpmethod"), spacing=0.29)
+    straight = toy.problem([], lateral=False, t_end=5.0)
+    model = build_model(backend._structure(straight, False))
+    assert backend.solve(straight).status is SolveStatus.SOLVED
+    assert "_function" not in vars(model)
+    first, again = backend.solve(bend()), backend.solve(bend())
+    assert "_function" in vars(model)
+    assert again.build_time < 0.5 * first.build_time
+    config = CasadiConfig(solver="sqpmethod", max_iterations=77)
+    model = build_model(CasadiBackend(config, spacing=0.29)._structure(straight, False))
+    model._compile = lambda: (_ for _ in ()).throw(RuntimeError("first line\nno licence"))
+    refused = CasadiBackend(config, spacing=0.29).solve(bend())
+    assert refused.status is SolveStatus.UNAVAILABLE
+    assert "no licence" in refused.detail
 
 
 def test_iteration_limit():

@@ -21,7 +21,8 @@ over s enter as lines around the last path; the NLP is solved again around its o
 trust region, until the exact values agree.
 
 The convex QP of all linear constraints is solved first, by daqp. Where it has no solution there is
-none, and with s alone and no bend in the way its solution is the answer already.
+none; where, with s alone, its solution keeps the friction circle as well, ``sqpmethod`` would only
+confirm it and is not asked.
 """
 
 from __future__ import annotations
@@ -39,12 +40,14 @@ from repair.solvers.nlp_instance import ROAD_SLACK, TOLERANCE, Instance
 from repair.solvers.nlp_model import Model, Solution, build_model
 from repair.solvers.nlp_rows import Structure
 from repair.solvers.separation import Separation, separate
-from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, SolveResult, SolveStatus, frozen
+from repair.types import Array, Curve, FrenetTrajectory, RepairProblem, Side, SolveResult, SolveStatus, frozen
 
 __all__ = ["CasadiBackend", "make"]
 
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
 _SIDES = 4  # sets of sides that are tried
+# On which sides of an obstacle the lower and the upper bounds of s and l are.
+_SIDE_OF = ((Side.AHEAD, Side.BEHIND), (Side.LEFT, Side.RIGHT))
 
 _STATUS = {
     "Solve_Succeeded": SolveStatus.SOLVED,
@@ -73,13 +76,19 @@ class _Sampled:
         return float(self.trajectory.t[-1])
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
-        times = np.asarray(t, dtype=np.float64)
-        known = self.trajectory
-        beyond = np.maximum(times - self.t_end, 0.0)[:, None]
-        position = np.column_stack([np.interp(times, known.t, known.position[:, k]) for k in (0, 1)])
-        velocity = np.column_stack([np.interp(times, known.t, known.velocity[:, k]) for k in (0, 1)])
+        times, known = np.asarray(t, dtype=np.float64), self.trajectory
+        position, velocity = np.empty((len(times), 2)), np.empty((len(times), 2))
+        for k in (0, 1):
+            position[:, k] = np.interp(times, known.t, known.position[:, k])
+            velocity[:, k] = np.interp(times, known.t, known.velocity[:, k])
+        position += np.maximum(times - known.t[-1], 0.0)[:, None] * velocity
         zero = np.zeros_like(position)
-        return FrenetTrajectory(times, position + beyond * velocity, velocity, zero, zero)
+        return FrenetTrajectory(times, position, velocity, zero, zero)
+
+
+def _guide(problem: RepairProblem) -> Curve:
+    """The curve that shows the way."""
+    return problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
 
 
 class CasadiBackend:
@@ -119,14 +128,16 @@ class CasadiBackend:
         deadline = None if time_limit is None else begin + time_limit
         try:
             model = build_model(self._structure(problem, timed=time_limit is not None))
+            instance, points = self._instance(problem, model)
+            built, before = time.perf_counter(), model.build_time
+            result = self._rounds(instance, points, warm_start, deadline, time_limit)
         except (BackendError, ImportError) as error:
             return SolveResult(
                 SolveStatus.UNAVAILABLE, build_time=time.perf_counter() - begin, detail=str(error)
             )
-        instance, points = self._instance(problem, model)
-        built = time.perf_counter()
-        result = self._rounds(instance, points, warm_start, deadline, time_limit)
-        return replace(result, build_time=built - begin, solve_time=time.perf_counter() - built)
+        late = model.build_time - before  # the NLP is made when it is first needed
+        spent = time.perf_counter() - built
+        return replace(result, build_time=built - begin + late, solve_time=spent - late)
 
     def _structure(self, problem: RepairProblem, timed: bool) -> Structure:
         c = self.config
@@ -151,19 +162,16 @@ class CasadiBackend:
     def _instance(self, problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
         """Lay out the problem, and the initial control points (n, 2)."""
         n, p, h = model.structure.n, self.degree, self.spacing
-        reference = fit_to_curve(problem.reference, problem.t_rep, n, p, h)
         origin = np.array([problem.start[0, 0], 0.0])
-        state = problem.reference.sample([problem.t_rep])
         derivatives = np.zeros((p, 2))
         derivatives[:3] = problem.start
         if p > 3:
-            derivatives[3] = state.jerk[0]
+            derivatives[3] = problem.reference.sample([problem.t_rep]).jerk[0]
         head = splice_points(derivatives, p, h) - origin
-        guide: Curve = problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
-        points = fit_to_curve(guide, problem.t_rep, n, p, h).points - origin
-        points = np.vstack([head, points[p:]])
-        if not problem.lateral:
-            points[p:, 1] = reference.points[p:, 1]
+        points = fit_to_curve(_guide(problem), problem.t_rep, n, p, h).points - origin
+        points[:p] = head
+        if not problem.lateral and problem.passing is not None:
+            points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
         return Instance(problem, model, origin, head), points
 
     # -- rounds ----------------------------------------------------------------------------------
@@ -184,7 +192,12 @@ class CasadiBackend:
         separation, points, why, closest = self._open(instance, points)
         if why:
             return self._infeasible(instance, why, closest)
-        points = self._warmer(instance, separation, points, warm_start)
+        residuals = instance.residuals(separation, points)
+        if _answered(instance, points, residuals):
+            word = "the optimum of the linear rows keeps the others too"
+            found, cost = self._curve(instance, points), instance.objective(points)
+            return SolveResult(SolveStatus.SOLVED, found, cost, detail=word, residuals=residuals)
+        points = self._warmer(instance, separation, points, residuals, warm_start)
         iterations = 0
         for round_ in range(self.config.rounds):
             trust = _TRUST * 0.5**round_ if round_ else None
@@ -201,7 +214,7 @@ class CasadiBackend:
             shape = instance.shape(points)
             room = instance.room(shape, min(ROAD_SLACK, 0.5 * trust) if trust else ROAD_SLACK)
             separation = separate(
-                problem, instance.windows, len(model.obstacle), shape, room, separation.side
+                problem, instance.windows, len(model.obstacle), shape, room, separation.side, instance.boxes
             )
         detail = word
         if status is SolveStatus.SOLVED and not kept:
@@ -211,11 +224,14 @@ class CasadiBackend:
             detail = f"time limit of {time_limit:g} s"
         elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
             detail = f"{word}; at the last iterate {_worst(residuals)}"
-        curve = None
-        if kept and status is not SolveStatus.INFEASIBLE:
-            curve = UniformBSpline(problem.t_rep, self.spacing, self.degree, frozen(points + instance.origin))
+        usable = kept and status is not SolveStatus.INFEASIBLE
+        curve = self._curve(instance, points) if usable else None
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
+
+    def _curve(self, instance: Instance, points: Array) -> UniformBSpline:
+        t_rep = instance.problem.t_rep
+        return UniformBSpline(t_rep, self.spacing, self.degree, frozen(points + instance.origin))
 
     def _infeasible(
         self, instance: Instance, why: str, closest: tuple[Array, dict[str, float]] | None
@@ -223,8 +239,7 @@ class CasadiBackend:
         """No solution; with the curve, if any, that keeps all other linear rows and comes closest."""
         if closest is None:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
-        points = frozen(closest[0] + instance.origin)
-        curve = UniformBSpline(instance.problem.t_rep, self.spacing, self.degree, points)
+        curve = self._curve(instance, closest[0])
         return SolveResult(
             SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve}
         )
@@ -240,31 +255,31 @@ class CasadiBackend:
         obstacles by the least is asked for its sides instead, and so on.
         """
         model, problem, windows = instance.model, instance.problem, instance.windows
-        slope = instance.slope()
-        moment = windows.start[:, None] + windows.fraction * (windows.end - windows.start)[:, None]
-        guide: Curve = problem.reference if problem.passing is None else _Sampled(problem.passing.guide)
-        shape = guide.sample(moment.ravel()).position.reshape(*moment.shape, 2)
+        slope = instance.slope
+        moment = windows.moment
+        shape = _guide(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
         if not problem.lateral:
             shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
         room = instance.room(shape)
         why, before = "", None
         closest: tuple[Array, dict[str, float]] | None = None
         for _ in range(_SIDES):
-            separation = separate(problem, windows, len(model.obstacle), shape, room)
+            separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
             if separation.why:
                 return separation, points, separation.why, closest
             side = separation.side
             if before is not None and side is not None and np.array_equal(side, before):
                 break
             before = side
-            why = why or _gap(separation)
-            low, high = instance.bounds(separation, points)
-            x, feasible = model.unknowns(points), not _gap(separation)
-            if feasible:
-                x, feasible = model.presolve(x, slope, low, high)
-            if feasible:
-                return separation, model.with_unknowns(points, x), "", closest
-            modest = instance.bounds(separation, points, modest=True)
+            gap = _gap(separation)
+            why = why or gap
+            low, high = instance.bounds(separation, None)
+            x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
+            if x is not None:
+                points = instance.relaxed = model.with_unknowns(points, x)
+            if possible:
+                return separation, points, "", closest
+            modest = instance.bounds(separation, None, modest=True)
             elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
             if elastic is None:
                 why = why or "no curve from the start state keeps the limits and the road"
@@ -278,25 +293,32 @@ class CasadiBackend:
         return separation, points, why, closest
 
     def _warmer(
-        self, instance: Instance, separation: Separation, points: Array, warm_start: Curve | None
+        self,
+        instance: Instance,
+        separation: Separation,
+        points: Array,
+        residuals: dict[str, float],
+        warm_start: Curve | None,
     ) -> Array:
         """The neighbouring probe's curve instead of ``points`` where it violates less."""
         if warm_start is None or warm_start.t_start > instance.problem.t_rep + 1e-9:
+            return points
+        worst = max(residuals.values())
+        if worst <= 0.0:
             return points
         model, t_rep = instance.model, instance.problem.t_rep
         shifted = (
             fit_to_curve(warm_start, t_rep, len(points), self.degree, self.spacing).points - instance.origin
         )
         warm = model.with_unknowns(points, model.unknowns(shifted))
-        worst = [max(instance.residuals(separation, p).values()) for p in (warm, points)]
-        return warm if worst[0] < worst[1] else points
+        return warm if max(instance.residuals(separation, warm).values()) < worst else points
 
     def _run(
         self, instance: Instance, points: Array, low: Array, high: Array, deadline: float | None
     ) -> tuple[Array, SolveStatus, str, int]:
         """One NLP: the new control points, the status, the solver's word, the iterations."""
         model = instance.model
-        x0, slope, data = model.unknowns(points), instance.slope(), instance.sample_data(points)
+        x0, slope, data = model.unknowns(points), instance.slope, instance.sample_data(points)
         solution = model.solve(x0, data, slope, low, high, deadline)
         status, word = _status(model, solution), solution.word
         if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
@@ -318,6 +340,16 @@ def _status(model: Model, solution: Solution) -> SolveStatus:
     return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
 
 
+def _answered(instance: Instance, points: Array, residuals: dict[str, float]) -> bool:
+    """Whether the optimum of the linear rows keeps the nonlinear ones too, and so is the NLP's.
+
+    Only where there are few enough of those to look at (s alone); IPOPT is left to find its own.
+    """
+    if points is not instance.relaxed or instance.model.structure.solver != "sqpmethod":
+        return False
+    return not instance.problem.lateral and max(residuals.values()) <= 0.0 and instance.keeps_circle(points)
+
+
 def _require(problem: RepairProblem) -> None:
     if not problem.t_end - problem.t_rep > 1e-9:
         raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
@@ -328,13 +360,13 @@ def _require(problem: RepairProblem) -> None:
 def _missed(instance: Instance, separation: Separation, points: Array, miss: float) -> str:
     """The obstacle that is missed by the most, as a sentence."""
     position = instance.model.obstacle @ points + instance.origin
-    depth = np.stack([separation.lower - position, position - separation.upper])
+    depth = np.array((separation.lower - position, position - separation.upper))
     row = int(np.argmax(np.max(depth, axis=(0, 2)) > 0.99 * miss - 1e-6))
     end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
-    who = (separation.lower_by, separation.upper_by)[int(end)][row, axis]
+    side = _SIDE_OF[int(axis)][int(end)]
     return (
         f"passing as the guide does, every curve within the limits comes at least {miss:.2f} m too close to "
-        f"{separation.who(who)} (t = {separation.times[row]:.2f} s)"
+        f"{separation.who(row, side)} (t = {separation.times[row]:.2f} s)"
     )
 
 
@@ -344,9 +376,9 @@ def _gap(separation: Separation) -> str:
     if not closed.any():
         return ""
     row, axis = (int(i[0]) for i in np.nonzero(closed))
-    below, above = separation.lower_by[row, axis], separation.upper_by[row, axis]
+    below, above = (separation.who(row, side) for side in _SIDE_OF[axis])
     t = separation.times[row]
-    return f"{separation.who(below)} and {separation.who(above)} leave no gap at t = {t:.2f} s"
+    return f"{below} and {above} leave no gap at t = {t:.2f} s"
 
 
 def _worst(residuals: dict[str, float]) -> str:

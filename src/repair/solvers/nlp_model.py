@@ -9,9 +9,10 @@ alone and is kept for the life of the process.
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -51,20 +52,83 @@ class Solution:
     violation: float
 
 
+class _Buffered:
+    """A CasADi function that reads and writes NumPy arrays of its own.
+
+    Called with DM it spends several times what a small QP takes on converting them.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        All its inputs dense, or given in ``fixed``.
+    fixed : casadi.DM
+        Inputs that never change, by name.
+    """
+
+    def __init__(self, function: Any, **fixed: Any) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._inputs: dict[str, Array] = {}
+        # An input that is left out would be read as zeros, or crash the plugin: all are set.
+        for k, name in enumerate(function.name_in()):
+            value = np.full(function.nnz_in(k), function.default_in(k))
+            if name in fixed:
+                value[:] = fixed[name].nonzeros()
+            self._inputs[name] = value
+            self._buffer.set_arg(k, value.data)
+        self._outputs: dict[str, Array] = {}
+        for k, name in enumerate(function.name_out()):
+            self._outputs[name] = np.zeros(function.nnz_out(k))
+            self._buffer.set_res(k, self._outputs[name].data)
+
+    def __call__(self, **values: Array) -> dict[str, Array]:
+        """Evaluate; the outputs by name are overwritten by the next call."""
+        for name, value in values.items():
+            self._inputs[name][:] = value
+        self._evaluate()
+        return self._outputs
+
+    def stats(self) -> dict[str, Any]:
+        """The solver's statistics of the last call."""
+        return dict(self._buffer.stats())
+
+
 class Model(Layout):
-    """One NLP: its constant matrices, and the functions that solve it."""
+    """One NLP: its constant matrices, and the functions that solve it.
+
+    The NLP itself is made when it is first solved: many problems end before, with the linear rows.
+    ``build_time`` is what has been spent on making functions so far [s].
+    """
 
     def __init__(self, structure: Structure) -> None:
+        import casadi as ca
+
         begin = time.perf_counter()
         super().__init__(structure)
         self._deadline: _Deadline | None = None
+        self._lock = threading.Lock()  # models are shared, and so are their buffers
+        p = structure.degree
+        self._hessian = ca.DM(np.kron(np.eye(structure.axes), self.hessian[p:, p:]))
+        self._matrix = _sparse(self.free)
         try:
-            self._compile()
+            if not ca.has_nlpsol(structure.solver):
+                ca.load_nlpsol(structure.solver)  # says why it cannot
+            self._qp = _quadratic_program("presolve", self._hessian, self._matrix)
+            self._compile_elastic()
         except RuntimeError as error:
-            raise BackendError(f"CasADi cannot make the solver: {_last_line(error)}") from error
+            raise _unavailable(error) from error
         self.build_time = time.perf_counter() - begin
 
-    def _compile(self) -> None:
+    @cached_property
+    def _function(self) -> _Buffered:
+        begin = time.perf_counter()
+        try:
+            return _Buffered(self._compile())
+        except RuntimeError as error:
+            raise _unavailable(error) from error
+        finally:
+            self.build_time += time.perf_counter() - begin
+
+    def _compile(self) -> Any:
         import casadi as ca
 
         s, p = self.structure, self.structure.degree
@@ -73,33 +137,30 @@ class Model(Layout):
         count = len(self.tau)
         data = ca.SX.sym("data", count, SAMPLED)
         slope = ca.SX.sym("slope", m * s.axes)
-        hessian = ca.DM(np.kron(np.eye(s.axes), self.hessian[p:, p:]))
+        hessian, matrix = self._hessian, self._matrix
         objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
         axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        matrix = _sparse(self.free_matrix())
         along, across, rest = self._nonlinear(axes, data)
         g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
         nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
-        # For SQP: the objective's own Hessian and the friction circles' J'J, positive definite always.
-        factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
-        circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
-        bent = factor * hessian
-        for part in (along, across):
-            slope_of = ca.jacobian(part, x)
-            bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
-        names = ["x", "p", "lam_f", "lam_g"]
-        curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
-        self._function = self._make_solver(nlp, curvature)
-        shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
-        self._qp = ca.conic("presolve", "daqp", shapes, {"error_on_fail": False})
-        self._qp_data = {"h": hessian, "a": matrix}
-        self._compile_elastic()
+        curvature = None
+        if s.solver != "ipopt":
+            # The objective's own Hessian and the friction circles' J'J, positive definite always.
+            factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
+            circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
+            bent = factor * hessian
+            for part in (along, across):
+                slope_of = ca.jacobian(part, x)
+                bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
+            names = ["x", "p", "lam_f", "lam_g"]
+            curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
+        return self._make_solver(nlp, curvature)
 
     def _compile_elastic(self) -> None:
         """The QP in which all obstacle rows give way by the same, smallest possible amount."""
         import casadi as ca
 
-        matrix = self.free_matrix()
+        matrix = self.free
         owner = np.repeat([rows.family == "obstacles" for rows in self.linear], [len(k) for k in self.kept])
         self._soft = np.flatnonzero(owner)
         count, m = matrix.shape
@@ -111,9 +172,9 @@ class Model(Layout):
         h[:m, :m] += 1e-4 * np.kron(
             np.eye(self.structure.axes), self.hessian[self.structure.degree :, self.structure.degree :]
         )
-        self._elastic_data = {"h": ca.DM(h), "a": _sparse(a)}
-        shapes = {k: v.sparsity() for k, v in self._elastic_data.items()}
-        self._elastic_qp = ca.conic("elastic", "daqp", shapes, {"error_on_fail": False})
+        self._elastic_qp = _quadratic_program("elastic", ca.DM(h), _sparse(a))
+        self._elastic_low = np.full(m + 1, -np.inf)
+        self._elastic_low[m] = 0.0
 
     def elastic(self, slope: Array, low: Array, high: Array) -> tuple[Array, float] | None:
         """Unknowns that keep all linear rows but the obstacles', and those as nearly as possible.
@@ -125,18 +186,17 @@ class Model(Layout):
             By how much [m] the obstacle rows are missed. None instead of both if even the other rows
             contradict each other.
         """
-        rows, m = self._qp_data["a"].shape
-        upper = high[:rows].copy()
+        rows = self.linear_count
+        low, upper = low[:rows], high[:rows].copy()
         upper[self._soft] = np.inf
-        lba = np.concatenate([low[:rows], np.full(len(self._soft), -np.inf)])
-        uba = np.concatenate([upper, high[self._soft]])
-        g = np.concatenate([1e-4 * slope, [100.0]])
-        lbx = np.concatenate([np.full(m, -np.inf), [0.0]])
-        out = self._elastic_qp(**self._elastic_data, g=g, lba=lba, uba=uba, lbx=lbx)
-        if int(self._elastic_qp.stats()["return_status"]) <= 0:
-            return None
-        x = np.asarray(out["x"]).ravel()
-        return x[:m], float(x[m])
+        lba = np.concatenate((low, np.full(len(self._soft), -np.inf)))
+        uba = np.concatenate((upper, high[self._soft]))
+        g = np.append(1e-4 * slope, 100.0)
+        with self._lock:
+            out = self._elastic_qp(g=g, lba=lba, uba=uba, lbx=self._elastic_low)
+            if int(self._elastic_qp.stats()["return_status"]) <= 0:
+                return None
+            return out["x"][:-1].copy(), float(out["x"][-1])
 
     def _nonlinear(self, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
         """Accelerations, curvature of the driven path, ends of the body at the samples.
@@ -190,22 +250,23 @@ class Model(Layout):
             }  # fmt: skip
         return ca.nlpsol("repair", s.solver, nlp, options)
 
-    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array, bool]:
+    def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array | None, bool]:
         """The convex QP of the objective and the linear rows alone.
 
         Returns
         -------
-        x : array
-            Its solution, or ``x0`` where it has none.
+        x : array or None
+            Its solution, where daqp has found one.
         possible : bool
             False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
-        rows = self._qp_data["a"].shape[0]
-        out = self._qp(**self._qp_data, g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
-        word = int(self._qp.stats()["return_status"])
-        if word > 0:
-            return np.asarray(out["x"]).ravel(), True
-        return x0, word != _DAQP_INFEASIBLE
+        rows = self.linear_count
+        with self._lock:
+            out = self._qp(g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
+            word = int(self._qp.stats()["return_status"])
+            if word > 0:
+                return out["x"].copy(), True
+        return None, word != _DAQP_INFEASIBLE
 
     def solve(
         self, x0: Array, data: Array, slope: Array, low: Array, high: Array, deadline: float | None
@@ -216,27 +277,34 @@ class Model(Layout):
         ----------
         x0 : (m,) array
             Initial guess of the unknowns.
-        data : (S, 8) array
+        data : (8, S) array
             See :data:`SAMPLED`.
         slope : (m,) array
             Linear part of the objective.
         low, high : (R,) array
-            Bounds of all rows, see :meth:`bounds`.
+            Bounds of all rows: the linear ones, then the nonlinear ones.
         deadline : float or None
             ``time.perf_counter()`` at which to stop; needs ``timed``.
+
+        Raises
+        ------
+        BackendError
+            If CasADi cannot make the solver.
         """
-        if self._deadline is not None:
-            self._deadline.at = deadline if deadline is not None else float("inf")
-        try:
-            out = self._function(x0=x0, p=np.concatenate([data.T.ravel(), slope]), lbg=low, ubg=high)
-        except RuntimeError as error:
-            return Solution(x0, _last_line(error), 0, np.inf)
-        x, g = np.asarray(out["x"]).ravel(), np.asarray(out["g"]).ravel()
-        violation = float(np.max(np.maximum(low - g, g - high), initial=0.0))
-        try:
-            stats = self._function.stats()
-        except RuntimeError:  # sqpmethod has no word for a QP that fails
-            return Solution(x, "QP_Failed", 0, violation)
+        with self._lock:
+            function = self._function
+            if self._deadline is not None:
+                self._deadline.at = deadline if deadline is not None else float("inf")
+            try:
+                out = function(x0=x0, p=np.concatenate((data.ravel(), slope)), lbg=low, ubg=high)
+            except RuntimeError as error:
+                return Solution(x0, _last_line(error), 0, np.inf)
+            x, g = out["x"].copy(), out["g"]
+            violation = float(np.maximum(low - g, g - high).max(initial=0.0))
+            try:
+                stats = function.stats()
+            except RuntimeError:  # sqpmethod has no word for a QP that fails
+                return Solution(x, "QP_Failed", 0, violation)
         return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
 
 
@@ -282,10 +350,22 @@ def _deadline_callback(nlp: dict[str, Any]) -> _Deadline:
     return holder
 
 
+def _quadratic_program(name: str, hessian: Any, matrix: Any) -> _Buffered:
+    import casadi as ca
+
+    shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
+    function = ca.conic(name, "daqp", shapes, {"error_on_fail": False})
+    return _Buffered(function, h=hessian, a=matrix)
+
+
 def _sparse(matrix: Array) -> Any:
     import casadi as ca
 
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
+
+
+def _unavailable(error: Exception) -> BackendError:
+    return BackendError(f"CasADi cannot make the solver: {_last_line(error)}")
 
 
 def _last_line(error: Exception) -> str:
@@ -295,5 +375,5 @@ def _last_line(error: Exception) -> str:
 
 @lru_cache(maxsize=256)
 def build_model(structure: Structure) -> Model:
-    """The model of a structure; built at the first call, kept after that."""
+    """The model of a structure; made at the first call, kept after that."""
     return Model(structure)

@@ -13,11 +13,15 @@ from functools import lru_cache
 from math import comb
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.bspline import basis_matrix, derivative_matrix, segment_matrix
 from repair.types import Array, frozen
 
-__all__ = ["Layout", "Rows", "Structure", "bernstein_rows"]
+__all__ = ["FAMILIES", "Layout", "Rows", "Structure", "bernstein_rows"]
+
+
+FAMILIES = ("velocity", "acceleration", "jerk", "obstacles")
 
 
 @dataclass(frozen=True)
@@ -146,6 +150,20 @@ class Layout:
         The linear rows by family; ``obstacles`` of l include the road.
     kept : list of int arrays
         For each of them, the rows that the unknowns can move.
+    free : (L, m) array
+        All linear rows that the unknowns can move, over the unknowns; the direction of travel last.
+    given : (L, 2 p) array
+        The same rows over the given control points, s first.
+    bounded : list of tuples
+        Axis, ``kept`` and place in those rows of each axis' obstacle rows.
+    kind : int array
+        What bounds each row, the nonlinear ones included: 0 to 5 velocity, acceleration, jerk of s and
+        l; 6 nothing that is known beforehand; 7 the direction of travel; 8 the friction circle; 9, 10
+        the accelerations across and along; 11 the path's curvature.
+    order : int array
+        0 to 2 for the rows of ``evaluated`` that are velocities, accelerations, jerks.
+    evaluated : (E, n) array
+        ``velocity``, ``acceleration``, ``jerk``, ``obstacle`` and ``samples`` on top of each other.
     """
 
     def __init__(self, structure: Structure) -> None:
@@ -168,6 +186,15 @@ class Layout:
         self._quadratic()
         self.linear = self._linear_rows()
         self.kept = [np.flatnonzero(np.abs(r.matrix[:, p:]).max(axis=1) > 1e-12) for r in self.linear]
+        self._over_unknowns()
+        parts = (self.velocity, self.acceleration, self.jerk, self.obstacle)
+        self.evaluated = np.vstack((*parts, *self.samples))
+        self.family_start = np.cumsum([0, *(len(part) for part in parts)])
+        self.order = np.repeat(np.arange(3), [len(part) for part in parts[:3]])
+        self.sampled_given = np.vstack(self.samples)[:, :p]
+        self.edge = np.arange(segments * s.windows + 1) * (h / s.windows)
+        self.fraction = np.arange(p + 1) / p
+        self.window_row = np.arange(segments * s.windows)[:, None] * p + np.arange(p + 1)
 
     def _quadratic(self) -> None:
         """Exact integrals of the squared derivatives and of the squared distance (Gauss-Legendre)."""
@@ -201,42 +228,29 @@ class Layout:
             ]
         return rows
 
-    def free_matrix(self) -> Array:
-        """All linear rows that the unknowns can move, over the unknowns; the direction of travel last."""
+    def _over_unknowns(self) -> None:
+        """The linear rows over the unknowns and over the given control points."""
         s, p = self.structure, self.structure.degree
-        m = s.n - p
-        blocks = []
+        free, given = [], []
+        kind: list[int] = []
+        self.bounded: list[tuple[int, npt.NDArray[np.intp], slice]] = []
         for rows, kept in zip(self.linear, self.kept, strict=True):
-            block = np.zeros((len(kept), m * s.axes))
-            block[:, rows.axis * m : (rows.axis + 1) * m] = rows.matrix[kept][:, p:]
-            blocks.append(block)
+            picked, place = rows.matrix[kept], FAMILIES.index(rows.family)
+            if rows.family == "obstacles":
+                self.bounded.append((rows.axis, kept, slice(len(kind), len(kind) + len(kept))))
+            free.append(np.kron(np.arange(s.axes) == rows.axis, picked[:, p:]))
+            given.append(np.kron(np.arange(2) == rows.axis, picked[:, :p]))
+            kind += [6 if rows.family == "obstacles" else 2 * place + rows.axis] * len(kept)
         if s.lateral:
-            free = self.velocity[self.kept[0]][:, p:]
-            blocks += [np.hstack([s.tangent * free, sign * free]) for sign in (-1.0, 1.0)]
-        return np.vstack(blocks)
-
-    def bounds(self, head: Array, lower: list[Array], upper: list[Array]) -> tuple[Array, Array]:
-        """Bounds of the rows that the unknowns can move, the given points' share taken off.
-
-        Parameters
-        ----------
-        head : (p, 2) array
-            The given control points.
-        lower, upper : list of arrays
-            Of the rows of :attr:`linear` in order, then of the nonlinear ones.
-        """
-        p, count = self.structure.degree, len(self.linear)
-        low, high = [], []
-        for rows, kept, below, above in zip(self.linear, self.kept, lower, upper, strict=False):
-            share = rows.matrix[kept][:, :p] @ head[:, rows.axis]
-            low.append(below[kept] - share)
-            high.append(above[kept] - share)
-        if self.structure.lateral:
-            given = self.velocity[self.kept[0]][:, :p] @ head
+            moving = self.velocity[self.kept[0]]
             for sign in (-1.0, 1.0):
-                low.append(-(self.structure.tangent * given[:, 0] + sign * given[:, 1]))
-                high.append(np.full(len(given), np.inf))
-        return np.concatenate(low + lower[count:]), np.concatenate(high + upper[count:])
+                free.append(np.kron([s.tangent, sign], moving[:, p:]))
+                given.append(np.kron([s.tangent, sign], moving[:, :p]))
+            kind += [7] * (2 * len(moving))
+        self.free, self.given = np.vstack(free), np.vstack(given)
+        self.linear_count = len(self.free)
+        nonlinear = (8, 9, 10, 11, 6, 6) if s.lateral else (8, 9)
+        self.kind = np.concatenate((kind, np.repeat(nonlinear, len(self.tau)))).astype(np.intp)
 
     def unknowns(self, points: Array) -> Array:
         """The unknowns (m,) among control points (n, 2)."""

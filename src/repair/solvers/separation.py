@@ -15,18 +15,20 @@ and nothing but the hull is lost; where a step falls inside, e is raised until i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from repair.types import Array, LateralBounds, RepairProblem, Side
 
-__all__ = ["NOBODY", "ROAD", "Separation", "Windows", "road_room", "separate"]
+__all__ = ["NOBODY", "ROAD", "Boxes", "Separation", "Windows", "boxes_in", "road_room", "separate"]
 
 NOBODY, ROAD = -1, -2
 # The coordinate times SIGN exceeds the edge times SIGN on each side, in the order of Side.
 _SIGN = np.array([-1.0, 1.0, 1.0, -1.0])
 _AXIS = np.array([0, 0, 1, 1])
+_SIDES = np.arange(4)
 assert (Side.BEHIND, Side.AHEAD, Side.LEFT, Side.RIGHT) == (0, 1, 2, 3)
 # A metre along the lane is worth less than one across it when the side of passing is chosen.
 _ROOM_LATERAL = 0.5
@@ -43,7 +45,7 @@ class Windows:
     start, end : (W,) array
         Time span of the windows [s]; of length zero where points are sampled.
     row : (W, C) int array
-        Row of the model that holds point j of the window (end points are shared).
+        Row of the model that holds point j of the window; windows share no more than their end points.
     fraction : (C,) array
         Where in the window point j acts, 0 to 1.
     """
@@ -53,75 +55,148 @@ class Windows:
     row: npt.NDArray[np.intp]
     fraction: Array
 
+    @cached_property
+    def moment(self) -> Array:
+        """Time (W, C) at which each point acts [s]."""
+        return np.asarray(
+            self.start[:, None] + self.fraction * (self.end - self.start)[:, None], dtype=np.float64
+        )
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The obstacles as the windows see them, whatever the curve.
+
+    Attributes
+    ----------
+    cover : (C, N, W, 4) array
+        Bernstein points of the covering line of each side's signed edge; -inf where it asks for nothing.
+    asked : (N, W) bool array
+        Whether the obstacle asks for anything.
+    start : (N, 4) array
+        What the start has to spare on each side [m]; NaN where the obstacle is not there yet.
+    rightmost, leftmost : (N, W) array
+        Ends of l that the box reaches, with the margin.
+    """
+
+    cover: Array
+    asked: npt.NDArray[np.bool_]
+    start: Array
+    rightmost: Array
+    leftmost: Array
+
 
 @dataclass
 class Separation:
-    """Bounds (R, 2) of the position rows ``[s, l]`` and whom they come from.
+    """Bounds (R, 2) of the position rows ``[s, l]``, and whom they come from.
 
-    ``side`` (N, W) is the side taken of each obstacle in each window, ``room`` the road's room that was
-    used. ``why`` names a conflict known before any solver is asked; empty where there is none.
+    ``side`` (N, W) is the side taken of each obstacle in each window, ``claims`` (C, N, W, 4) what each
+    obstacle asks for. ``why`` names a conflict known before any solver is asked; empty where there is none.
     """
 
     lower: Array
     upper: Array
-    lower_by: npt.NDArray[np.int64]
-    upper_by: npt.NDArray[np.int64]
-    times: Array
+    windows: Windows
+    ids: npt.NDArray[np.int64]
     side: npt.NDArray[np.intp] | None = None
-    room: tuple[Array, Array] | None = None
+    claims: Array | None = None
     why: str = ""
 
-    def who(self, number: int) -> str:
+    @cached_property
+    def times(self) -> Array:
+        """When each row acts [s]."""
+        times = np.zeros(len(self.lower))
+        times[self.windows.row] = self.windows.moment
+        return times
+
+    def owner(self, row: int, side: int) -> int:
+        """Whom a row's bound on a side comes from: an obstacle's id, NOBODY or ROAD."""
+        bound = (-self.upper[row, 0], self.lower[row, 0], self.lower[row, 1], -self.upper[row, 1])[side]
+        if not np.isfinite(bound):
+            return NOBODY
+        if self.claims is not None:
+            window, point = np.nonzero(self.windows.row == row)
+            own = np.flatnonzero((self.claims[point, :, window, side] == bound).any(axis=0))
+            if len(own):
+                return int(self.ids[own[-1]])
+        return ROAD
+
+    def who(self, row: int, side: int) -> str:
         """Name of the owner of a bound."""
+        number = self.owner(row, side)
         return "the edge of the road" if number == ROAD else f"obstacle {number}"
 
 
-def _edges(problem: RepairProblem, windows: Windows) -> tuple[Array, Array, Array]:
+def _knots(problem: RepairProblem, windows: Windows, width: float) -> Array:
+    """The times (K, W) at which an edge may bend: the windows' ends, and the steps in between."""
+    start, end, dt = windows.start, windows.end, problem.dt
+    ends = np.concatenate((start, end)).reshape(2, -1)
+    if width <= 0.0:
+        return ends
+    inner = int(width / dt + 1e-9) + 1
+    steps = (np.floor(start / dt + 1e-6) + np.arange(1, inner + 1)[:, None]) * dt
+    within = steps < end - 1e-9
+    if not within.any():
+        return ends
+    return np.concatenate((ends[:1], np.where(within, steps, end), ends[1:]))
+
+
+def _edges(problem: RepairProblem, windows: Windows) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Signed edges that cover the boxes' over each window.
 
     Returns
     -------
-    cover : (N, W, C, 4) array
+    cover : (C, N, W, 4) array
         Bernstein points of the covering line for each side; -inf where it asks for nothing.
     first : (N, 4) array
         Signed edges at the first instant, NaN where the obstacle is not there.
-    knots : (W, K) array
-        The times looked at.
+    some : (N, W) bool array
+        The obstacle is there during the window.
     """
-    width = float(np.max(windows.end - windows.start)) if len(windows.start) else 0.0
-    dt = problem.dt
-    inner = int(np.floor(width / dt + 1e-9)) + 1 if width > 0.0 else 0
-    base = np.floor(windows.start / dt + 1e-6)[:, None]
-    steps = (base + np.arange(1, inner + 1)) * dt
-    end = windows.end[:, None]
-    knots = np.concatenate([windows.start[:, None], np.where(steps < end - 1e-9, steps, end), end], axis=1)
+    width = float((windows.end - windows.start).max())
+    knots = _knots(problem, windows, width)
     lower, upper = problem.occupancy.at(knots.ravel())
-    shape = (len(problem.occupancy), *knots.shape, 2)
-    lower, upper = lower.reshape(shape), upper.reshape(shape)
-    edge = np.stack([-lower[..., 0], upper[..., 0], upper[..., 1], -lower[..., 1]], axis=-1)
-    present = np.isfinite(edge).all(axis=-1)  # (N, W, K)
-    # Only there at one end: that instant alone; there for a part: as far as it ever gets, throughout.
-    at_end = np.arange(knots.shape[1])[None, :] >= knots.shape[1] - 1
-    at_end = at_end | (knots >= end - 1e-9)
-    only_first = present[..., 0] & ~present[..., 1:].any(axis=-1) & (width > 0.0)
-    only_last = (present == at_end).all(axis=-1) & ~present[..., 0] & (width > 0.0)
-    some = present.any(axis=-1)
-    most = np.max(np.where(present[..., None], edge, -np.inf), axis=2, keepdims=True)
-    edge = np.where(present[..., None], edge, most)
-    span = np.maximum(end - windows.start[:, None], 1e-12)
-    where = ((knots - windows.start[:, None]) / span)[None, :, :, None]
+    edge = np.empty((len(lower), knots.size, 4))
+    np.negative(lower[..., 0], out=edge[..., 0])
+    edge[..., 1:3] = upper
+    np.negative(lower[..., 1], out=edge[..., 3])
+    edge = edge.reshape(len(lower), *knots.shape, 4).swapaxes(0, 1)  # (K, N, W, 4)
+    present = np.asarray(np.isfinite(edge).all(axis=-1))
+    all_there = bool(present.all())
+    first = edge[0, :, 0]
+    if not all_there:
+        first = np.where(present[0, :, 0, None], first, np.nan)
+        # There for a part: as far as it ever gets, throughout.
+        edge = np.where(present[..., None], edge, -np.inf)
+        edge = np.where(present[..., None], edge, edge.max(axis=0))
+    fraction = windows.fraction[:, None, None, None]
     with np.errstate(invalid="ignore"):
-        line = edge[:, :, :1] + (edge[:, :, -1:] - edge[:, :, :1]) * where
-        lift = np.max(edge - line, axis=2, keepdims=True)
-        cover = (
-            edge[:, :, :1] + (edge[:, :, -1:] - edge[:, :, :1]) * windows.fraction[None, None, :, None]
-        ) + np.maximum(lift, 0.0)
-    cover[~some] = -np.inf
+        rise = edge[-1] - edge[0]
+        cover = edge[0] + rise * fraction
+        if len(knots) > 2:
+            span = np.maximum(windows.end - windows.start, 1e-12)
+            where = ((knots - windows.start) / span)[:, None, :, None]
+            cover += np.maximum((edge - (edge[0] + rise * where)).max(axis=0), 0.0)
+    if all_there:
+        return cover, first, np.ones(cover.shape[1:3], dtype=np.bool_)
+    some = np.asarray(present.any(axis=0))
+    cover[:, ~some] = -np.inf
     if width > 0.0:
-        cover[only_first, 1:] = -np.inf
-        cover[only_last, :-1] = -np.inf
-    first = np.where(present[:, :1, 0, None], edge[:, :1, 0], np.nan)[:, 0]
-    return cover, first, knots
+        # Only there at one end: that instant alone.
+        at_end = (knots >= windows.end - 1e-9)[:, None]
+        cover[1:, present[0] & ~present[1:].any(axis=0)] = -np.inf
+        cover[:-1, (present == at_end).all(axis=0) & ~present[0]] = -np.inf
+    return cover, first, some
+
+
+def boxes_in(problem: RepairProblem, windows: Windows) -> Boxes | None:
+    """The obstacles over the windows; None where there is nothing to keep away from."""
+    if not len(problem.occupancy) or not len(windows.start):
+        return None
+    cover, first, some = _edges(problem, windows)
+    start = problem.start[0][_AXIS] * _SIGN - first
+    margin = problem.margin
+    return Boxes(cover, some, start, -cover[..., 3].max(axis=0) - margin, cover[..., 2].max(axis=0) + margin)
 
 
 def separate(
@@ -131,6 +206,7 @@ def separate(
     shape: Array,
     room: tuple[Array, Array] | None,
     side: npt.NDArray[np.intp] | None = None,
+    boxes: Boxes | None = None,
 ) -> Separation:
     """Choose sides and bound the position rows.
 
@@ -146,61 +222,62 @@ def separate(
         Right and left end of the road for each window; None where l is given.
     side : (N, W) int array, optional
         Sides decided before; chosen from ``shape`` otherwise.
+    boxes : Boxes, optional
+        :func:`boxes_in` of the same problem and windows, where it is known.
     """
-    lower, upper = np.full((rows, 2), -np.inf), np.full((rows, 2), np.inf)
-    lower_by, upper_by = (np.full((rows, 2), NOBODY, dtype=np.int64) for _ in range(2))
-    times = np.zeros(rows)
-    moment = windows.start[:, None] + windows.fraction * (windows.end - windows.start)[:, None]
-    times[windows.row.ravel()] = moment.ravel()
-    result = Separation(lower, upper, lower_by, upper_by, times, side, room)
-    if len(problem.occupancy) and len(windows.start):
-        _obstacles(problem, windows, shape, room, result)
+    boxes = boxes or boxes_in(problem, windows)
+    ids, table = problem.occupancy.ids, np.full((rows, 4), -np.inf)
+    claims, why = None, ""
+    if boxes is not None:
+        side, claims, why = _claims(problem, boxes, shape, room, side)
+    if claims is not None:
+        tight = claims.max(axis=1)  # (C, W, 4)
+    else:
+        tight = np.full((windows.row.shape[1], windows.row.shape[0], 4), -np.inf)
     if room is not None:
-        right, left = room
-        _tighten(result, 1, -1.0, windows.row, np.repeat(-left[:, None], windows.row.shape[1], 1), ROAD)
-        _tighten(result, 1, 1.0, windows.row, np.repeat(right[:, None], windows.row.shape[1], 1), ROAD)
-    return result
+        np.maximum(tight[..., 2], room[0], out=tight[..., 2])
+        np.maximum(tight[..., 3], -room[1], out=tight[..., 3])
+    # A row that two windows share has to satisfy both.
+    table[windows.row[:, :-1]] = tight[:-1].swapaxes(0, 1)
+    last = windows.row[:, -1]
+    table[last] = np.maximum(table[last], tight[-1])
+    return Separation(table[:, 1:3], -table[:, ::3], windows, ids, side, claims, why)
 
 
-def _obstacles(
+def _claims(
     problem: RepairProblem,
-    windows: Windows,
+    boxes: Boxes,
     shape: Array,
     room: tuple[Array, Array] | None,
-    result: Separation,
-) -> None:
-    """Bound the rows by the chosen side of every obstacle, or say in ``why`` that there is no way."""
-    cover, first, _ = _edges(problem, windows)
-    margin, ids = problem.margin, problem.occupancy.ids
-    start = problem.start[0][_AXIS] * _SIGN - first  # (N, 4)
+    side: npt.NDArray[np.intp] | None,
+) -> tuple[npt.NDArray[np.intp] | None, Array | None, str]:
+    """Sides, the signed bounds (C, N, W, 4) on the chosen one, or why there is no way."""
+    margin, cover, start = problem.margin, boxes.cover, boxes.start
     floor = min(margin, 0.0)  # a negative margin lets the curve into the box by as much
-    deep = np.where(np.isfinite(start), start, np.inf).max(axis=1) < floor - _TOUCH
+    deep = (start < floor - _TOUCH).all(axis=1)
     if deep.any():
-        result.why = f"the ego starts inside obstacle {ids[int(np.argmax(deep))]}"
-        return
-    slack = np.min(shape[None][..., _AXIS] * _SIGN - cover, axis=2)  # (N, W, 4); inf where nothing is asked
-    if problem.lateral:
-        assert room is not None
+        return side, None, f"the ego starts inside obstacle {problem.occupancy.ids[int(deep.argmax())]}"
+    if side is None or room is None:
+        # (N, W, 4); inf where nothing is asked
+        slack = ((shape.swapaxes(0, 1)[..., _AXIS] * _SIGN)[:, None] - cover).min(axis=0)
+    if room is not None:
         # Out of the road's reach: the road's own bounds keep the curve off.
-        right, left = room
-        beside = (-cover[..., 3].max(axis=2) - margin >= left) | (cover[..., 2].max(axis=2) + margin <= right)
+        beside = (boxes.rightmost >= room[1]) | (boxes.leftmost <= room[0])
     else:
-        beside = (slack[..., 2:] >= margin - 1e-9).any(axis=2)
-    if result.side is None:
-        result.side = _choose(problem, slack - margin, start)
-    side = result.side
-    needed = np.isfinite(cover).any(axis=(2, 3)) & ~beside
-    n, w = np.nonzero(needed)
-    chosen = side[n, w]
+        beside = (slack[..., 2:].max(axis=2)) >= margin - 1e-9
+    if side is None:
+        side = _choose(problem, slack - margin, start)
+    needed = boxes.asked & ~beside
+    keep: Array | float = margin
     # Who starts nearer than the margin keeps the distance it has.
-    from_start = np.zeros(start.shape, dtype=bool)
-    from_start[np.arange(len(start)), side[:, 0]] = needed[:, 0]
-    from_start &= np.isfinite(start) & (start >= floor - _TOUCH)
-    keep = np.where(from_start, np.clip(start, floor, margin), margin)
-    bound = cover[n, w, :, chosen] + keep[n, chosen][:, None]
-    for k in range(4):
-        mine = chosen == k
-        _tighten(result, int(_AXIS[k]), float(_SIGN[k]), windows.row[w[mine]], bound[mine], ids[n[mine]])
+    own = start[np.arange(len(start)), side[:, 0]]
+    near = needed[:, 0] & (own >= floor - _TOUCH) & (own < margin)
+    if near.any():
+        keep = np.full(start.shape, margin)
+        keep[near, side[near, 0]] = np.maximum(own[near], floor)
+        keep = keep[:, None]
+    mine = (side[..., None] == _SIDES) & needed[..., None]
+    return side, np.where(mine, cover + keep, -np.inf), ""
 
 
 def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[np.intp]:
@@ -213,39 +290,15 @@ def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[n
     start : (N, 4) array
         The same at the first instant; the given state rules sides out.
     """
-    along = _ROOM_ALONG[0] + _ROOM_ALONG[1] * max(float(problem.start[1, 0]), 0.0)
-    scale = np.array([along, along, _ROOM_LATERAL, _ROOM_LATERAL])
-    score = np.where(slack > 0.0, slack / scale, slack)
-    score[:, 0][np.isfinite(start) & (start < min(problem.margin, 0.0) - _TOUCH)] = -np.inf
-    if not problem.lateral:
-        score[..., 2:] = -np.inf
-    return np.asarray(np.argmax(score, axis=2))
-
-
-def _tighten(
-    result: Separation,
-    axis: int,
-    sign: float,
-    row: npt.NDArray[np.intp],
-    bound: Array,
-    who: int | npt.NDArray[np.int64],
-) -> None:
-    """Take over ``sign * x >= bound`` (M, C) where it is tighter than what is there."""
-    if not bound.size:
-        return
-    flat, value = row.ravel(), bound.ravel()
-    owner = np.broadcast_to(np.asarray(who).reshape(-1, 1), bound.shape).ravel()
-    order = np.argsort(value, kind="stable")  # the last one written is the tightest
-    flat, value, owner = flat[order], value[order], owner[order]
-    best = np.full(len(result.lower), -np.inf)
-    name = np.full(len(result.lower), NOBODY, dtype=np.int64)
-    best[flat], name[flat] = value, owner
-    if sign > 0:
-        better = best > result.lower[:, axis]
-        result.lower[better, axis], result.lower_by[better, axis] = best[better], name[better]
+    closed = start < min(problem.margin, 0.0) - _TOUCH
+    if problem.lateral:
+        along = _ROOM_ALONG[0] + _ROOM_ALONG[1] * max(float(problem.start[1, 0]), 0.0)
+        scale = np.array([along, along, _ROOM_LATERAL, _ROOM_LATERAL])
+        score = np.where(slack > 0.0, slack / scale, slack)
     else:
-        better = -best < result.upper[:, axis]
-        result.upper[better, axis], result.upper_by[better, axis] = -best[better], name[better]
+        score, closed = slack[..., :2].copy(), closed[:, :2]
+    score[:, 0][closed] = -np.inf
+    return np.asarray(score.argmax(axis=2))
 
 
 def road_room(
@@ -265,9 +318,17 @@ def road_room(
     edge : float
         Distance kept from either edge [m], as far as ``own`` leaves it.
     """
-    s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 9)
-    right, left = bounds.at(s)
-    inside = (bounds.s >= low[:, None]) & (bounds.s <= high[:, None])
-    right = np.maximum(right.max(axis=1), np.where(inside, bounds.right, -np.inf).max(axis=1))
-    left = np.minimum(left.min(axis=1), np.where(inside, bounds.left, np.inf).min(axis=1))
+    # The bounds are linear in between: their extremes are at the ends, and where they bend.
+    right, left = (side.reshape(2, -1) for side in bounds.at(np.concatenate((low, high))))
+    right, left = np.maximum(right[0], right[1]), np.minimum(left[0], left[1])
+    begin, end = bounds.s.searchsorted(low), bounds.s.searchsorted(high, side="right")
+    bends = end > begin
+    if bends.any():
+        cuts = np.empty(2 * len(low), dtype=np.intp)
+        # The very last point need not be among the bends: from there on it is the end's value.
+        cuts[::2], cuts[1::2] = np.minimum((begin, end), len(bounds.s) - 1)
+        inner = np.maximum.reduceat(bounds.right, cuts)[::2]
+        right = np.where(bends, np.maximum(right, inner), right)
+        inner = np.minimum.reduceat(bounds.left, cuts)[::2]
+        left = np.where(bends, np.minimum(left, inner), left)
     return np.minimum(right + edge, own_right), np.maximum(left - edge, own_left)
