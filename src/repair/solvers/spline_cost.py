@@ -51,16 +51,16 @@ def _structure(
     stack = np.vstack([derivative_matrix(n, k, spacing) for k in _ORDERS])
     size = (last - first) * axes
     where, factor = np.zeros((len(stack), axes, 10), dtype=np.intp), np.zeros((len(stack), axes, 10))
-    row = 0
+    begin = 0
     for k in _ORDERS:
-        pairs = list(combinations_with_replacement(range(k + 1), 2))
-        for i in range(n - k):
-            for slot, (low, high) in enumerate(pairs):
-                if first <= i + low and i + high < last:
-                    column = (i + low - first) * axes + np.arange(axes)
-                    where[row, :, slot] = column * (width + 1) + (high - low) * axes
-                    factor[row, :, slot] = stack[row, i + low] * stack[row, i + high]
-            row += 1
+        i = np.arange(n - k)
+        stencil, rows = stack[begin, : k + 1], slice(begin, begin + n - k)
+        for slot, (low, high) in enumerate(combinations_with_replacement(range(k + 1), 2)):
+            both = ((first <= i + low) & (i + high < last))[:, None]  # points are free
+            column = (i[:, None] + low - first) * axes + np.arange(axes)
+            where[rows, :, slot] = np.where(both, column * (width + 1) + (high - low) * axes, 0)
+            factor[rows, :, slot] = np.where(both, stencil[low] * stencil[high], 0.0)
+        begin += n - k
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     factors = frozen(factor.reshape(-1, 10))
     band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
