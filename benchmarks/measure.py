@@ -116,7 +116,8 @@ def together(
     warm_up : int
         Calls of each that are not counted.
     shortest : float
-        A call that takes less is repeated within a sample until it lasts that long [s].
+        A call that takes less is repeated within a sample until it lasts that long [s], after one more that
+        is not counted: what ran before it has emptied the processor's caches.
     """
     number = {}
     for name, call in calls.items():
@@ -132,6 +133,8 @@ def together(
         for _ in range(rounds):
             for name, call in calls.items():
                 repeats = range(number[name])
+                if number[name] > 1:
+                    call()
                 begin_wall, begin = time.perf_counter(), time.process_time()
                 for _ in repeats:
                     call()
