@@ -93,13 +93,16 @@ def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order:
     return matrix
 
 
-@lru_cache(maxsize=256)
+_KEPT = 40_000  # times * points of the largest matrix that is kept: 1.3 MB
+
+
+@lru_cache(maxsize=64)
 def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
     tau = np.frombuffer(offsets)
     return frozen(np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)]))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
     """Matrix (4 K, n) from control points to position and three derivatives at ``times``.
 
@@ -108,7 +111,8 @@ def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: flo
     since = np.frombuffer(times) - t_start
     tau = np.clip(since, 0.0, t_start + (n - degree) * spacing - t_start)
     # The same offsets come back for other start times, up to rounding.
-    matrix = _sampling(np.round(tau, 12).tobytes(), n, degree, spacing)
+    made = _sampling if len(tau) * n <= _KEPT else _sampling.__wrapped__
+    matrix = made(np.round(tau, 12).tobytes(), n, degree, spacing)
     beyond = since - tau
     out = np.flatnonzero(np.abs(beyond) > 1e-9)
     if not len(out):
@@ -165,8 +169,9 @@ class UniformBSpline:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # Probes ask for the same times over and over; the matrices are worth keeping.
-        matrix = _sampling_at(
+        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
+        made = _sampling_at if len(times) * len(self.points) <= _KEPT else _sampling_at.__wrapped__
+        matrix = made(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
         position, velocity, acceleration, jerk = (matrix @ self.points).reshape(4, len(times), 2)

@@ -187,6 +187,14 @@ class Checker:
         self._followed = _Followed(reference, t_end, sampled.position, sampled.velocity, slip)
         return path, sampled.position[:, 0], slip, orientation
 
+    def _kept(self, reference: Curve, t_end: float) -> _Followed:
+        """What was kept of the reference, at least until ``t_end``."""
+        kept = self._followed
+        while kept is None or kept.reference is not reference or kept.t_end < t_end:
+            self._follow(reference, t_end)
+            kept = self._followed  # another thread may have put its own reference there
+        return kept
+
     def _spliced(
         self, problem: RepairProblem, after: FrenetTrajectory, times: Array, first: int
     ) -> tuple[CartesianPath, Array, float | None]:
@@ -198,11 +206,7 @@ class Checker:
         frame, late = self.scene.frame, len(times) - len(after)
         if late == first == 0:
             return frame.cartesian(after), after.position[:, 0], None
-        kept = self._followed
-        if kept is None or kept.reference is not problem.reference or kept.t_end < problem.t_end:
-            self._follow(problem.reference, problem.t_end)
-            kept = self._followed
-        assert kept is not None
+        kept = self._kept(problem.reference, problem.t_end)
         position = np.concatenate((kept.position[first:late], after.position))
         velocity = np.concatenate((kept.velocity[first:late], after.velocity))
         path = frame.carry(times[first:], position, velocity)
@@ -338,6 +342,8 @@ _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not 
 
 
 def _finite(path: CartesianPath) -> bool:
-    if len(path.t) > 1 and math.isfinite(path.distance[-1] + np.add.reduce(path.heading)):
+    if len(path.t) > 1 and math.isfinite(
+        path.distance[-1] + np.add.reduce(path.heading) + np.add.reduce(path.speed)
+    ):
         return True  # a point that is not finite would make the distance so
-    return bool(np.isfinite(path.xy).all() and np.isfinite(path.heading).all())
+    return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))

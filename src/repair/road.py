@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,8 @@ __all__ = ["RoadBoundary", "RoadCorridor"]
 
 Points = npt.NDArray[np.complexfloating[Any, Any]]
 
+# A prepared geometry must not be asked by two threads at once, and shapely lets other threads run.
+_PREPARED = Lock()
 # The rectangle may come this close to the edge [m] only where the exact test says so.
 _TOUCH = 1e-6
 # Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
@@ -80,7 +83,9 @@ class RoadBoundary:
         """Whether polygons (K, V, 2) lie properly inside of the region."""
         import shapely
 
-        return np.asarray(shapely.contains_properly(self.region, shapely.polygons(outlines)))
+        polygons = shapely.polygons(outlines)
+        with _PREPARED:
+            return np.asarray(shapely.contains_properly(self.region, polygons))
 
     def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
         """Poses (K,) that lie inside because a larger box does; False says nothing.

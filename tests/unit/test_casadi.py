@@ -16,7 +16,7 @@ from repair.solvers import nlp_instance, nlp_model
 from repair.solvers.casadi_nlp import CasadiBackend
 from repair.solvers.nlp_model import build_model
 from repair.solvers.separation import NOBODY, ROAD, Windows, road_room, separate
-from repair.types import LateralBounds, Side, SolveStatus, frozen
+from repair.types import LateralBounds, Maneuver, Side, SolveStatus, frozen
 
 INF = np.inf
 
@@ -342,3 +342,14 @@ def test_the_body_stays_on_a_narrow_road():
     samples = result.curve.sample(np.arange(0.1, problem.t_end, 0.1))
     swing = 2.15 * np.sin(np.arctan2(samples.velocity[:, 1], samples.velocity[:, 0]))
     assert np.abs(samples.position[:, 1] + swing).max() <= 2.4 + 1e-3
+
+
+@pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
+def test_a_road_that_leaves_room_for_one_value_has_a_status(solver):
+    """Bounds that touch must not reach CasADi the wrong way round."""
+    narrow = LateralBounds(
+        frozen([0.0, 75.0, 77.0, 500.0]), frozen([-6.0, -6.0, -0.02, -0.02]), frozen([6.0, 6.0, 0.02, 0.02])
+    )
+    ahead = toy.problem([toy.box((40.0, 50.0), (-2.0, 2.0))], v0=20.0, t_end=5.0, bounds=narrow)
+    result = CasadiBackend(CasadiConfig(solver=solver)).solve(problems.guided(ahead, Maneuver.LEFT))
+    assert result.status in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE)

@@ -103,3 +103,20 @@ def test_a_curve_that_is_not_finite_is_no_trajectory(prepared):
             verdict = prepared.checker.check(problem, replace(curve, points=points))
         assert verdict.reasons == ("kinematics",)
         assert "not finite" in verdict.violations[0].detail
+
+
+def test_a_speed_that_is_not_a_number_is_no_trajectory(prepared):
+    """At one sample between two steps, where only the limits look."""
+    problem = prepared.source.at(0.0)[0]
+    good = next(curves(prepared, problem, 1, 0))
+
+    class Holed:
+        t_start, t_end = good.t_start, good.t_end
+
+        def sample(self, t):
+            found = good.sample(t)
+            velocity = np.array(found.velocity)
+            velocity[(np.abs(found.t - 0.525) < 1e-9)] = np.nan
+            return replace(found, velocity=velocity)
+
+    assert prepared.checker.check(problem, Holed()).reasons == ("kinematics",)

@@ -430,3 +430,17 @@ def test_literal_search_finds_the_same_f_ttr_in_scenario_1(scenarios):
         t = np.linspace(problem.t_rep, problem.t_end, 30)
         curve = UniformBSpline(problem.t_rep, 0.4, 3, np.array(slow.stages.refined))
         np.testing.assert_allclose(curve.sample(t).position, quick.solve.curve.sample(t).position, atol=0.05)
+
+
+@pytest.mark.parametrize("solver", ["newton", "lbfgs"])
+@pytest.mark.parametrize(
+    "weights",
+    [{"refine": RefineWeights(smooth=0.0, fit=0.0)}, {"deform": DeformWeights(smooth=0.0)}],
+    ids=["refinement", "deformation"],
+)
+def test_without_smoothness_there_is_still_a_finite_curve(solver, weights):
+    config = replace(PLAIN, solver=solver, **weights)
+    result = ego.EgoBackend(config).solve(make_problem(Side.BEHIND, lateral=False))
+    assert result.curve is not None
+    assert np.isfinite(result.curve.points).all()
+    assert np.isfinite(result.objective)

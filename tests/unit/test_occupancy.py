@@ -328,3 +328,25 @@ def test_culling_drops_what_is_out_of_reach():
     )
     kept = relevant(boxes, np.zeros((3, 2)), 0.0, 2.0, np.array([0.0, 40.0]), np.array([-2.0, 2.0]))
     assert kept.ids.tolist() == [103]
+
+
+def test_culling_keeps_whatever_comes_near_within_any_interval():
+    """Against brute force: boxes that move fast, appear, or disappear, in windows on and off the steps."""
+
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        boxes = []
+        for _ in range(8):
+            s, l = rng.uniform(-20.0, 60.0), rng.uniform(-20.0, 20.0)  # noqa: E741
+            present = np.sort(rng.uniform(0.0, 3.0, 2)) if rng.random() < 0.5 else (0.0, np.inf)
+            size = rng.uniform(0.5, 4.0, 2)
+            boxes.append(toy.box((s, s + size[0]), (l, l + size[1]), rng.uniform(-40.0, 40.0, 2), present))
+        occupancy = toy.occupancy(*boxes, duration=3.0)
+        begin, end = np.sort(rng.uniform(0.0, 3.0, 2)) if rng.random() < 0.5 else (0.5, 3.0)
+        reach, room = np.sort(rng.uniform(-10.0, 40.0, 2)), np.sort(rng.uniform(-6.0, 6.0, 2))
+        kept = set(relevant(occupancy, np.zeros((3, 2)), begin, end, reach, room).ids.tolist())
+        for t in np.linspace(begin, end, 101):
+            lower, upper = (box[:, 0] for box in occupancy.at([t]))
+            met = (upper[:, 0] > reach[0]) & (lower[:, 0] < reach[1])
+            met &= (upper[:, 1] > room[0]) & (lower[:, 1] < room[1])
+            assert set(occupancy.ids[met].tolist()) <= kept

@@ -7,11 +7,21 @@ import pytest
 from benchmarks import literal
 
 from repair.bspline import derivative_matrix
-from repair.solvers.penalties import REVERSE_JOINT, SoftBounds, cubic_quadratic, feasibility_bounds
+from repair.solvers.penalties import REVERSE_JOINT, SoftBounds, feasibility_bounds
 
 MAXIMA = np.array([[10.0, 2.0], [3.0, 2.5], [8.0, 9.0]])
 MINIMA = np.array([[0.0, -2.0], [-6.0, -2.5], [-8.0, -9.0]])
 WEIGHTS = (1.5, 0.7, 0.2)
+
+
+def cubic_quadratic(excess, joint):
+    """Penalty, slope and curvature of each excess."""
+    joints = np.broadcast_to(joint, excess.shape)
+    each = [
+        SoftBounds.of(np.zeros(1), np.full(1, d), np.ones(1)).evaluate(np.full(1, e))
+        for e, d in zip(excess, joints, strict=True)
+    ]
+    return np.array([x[0] for x in each]), *(np.array([x[k][0] for x in each]) for k in (1, 2))
 
 
 class bounds:

@@ -234,7 +234,7 @@ def _word(solution: Any) -> str:
 def _violation(rows: Array, lower: Array, upper: Array, z: Array) -> float:
     """Largest violation of a bound; NaN stays NaN."""
     value = rows @ z
-    return max(float(np.maximum.reduce(value - upper)), float(np.maximum.reduce(lower - value)), 0.0)
+    return float(np.maximum.reduce(np.concatenate((value - upper, lower - value)), initial=0.0))
 
 
 def _combined(rows: Array, lower: Array, upper: Array, y: Array) -> tuple[Array, float]:

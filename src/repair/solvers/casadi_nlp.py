@@ -205,7 +205,7 @@ class CasadiBackend:
             points, status, word, count = self._run(instance, points, low, high, deadline)
             iterations += count
             residuals = instance.residuals(separation, points)
-            kept = max(residuals.values()) <= TOLERANCE
+            kept = _largest(residuals) <= TOLERANCE
             if status is not SolveStatus.SOLVED or kept:
                 break
             if deadline is not None and time.perf_counter() > deadline:
@@ -303,7 +303,7 @@ class CasadiBackend:
         """The neighbouring probe's curve instead of ``points`` where it violates less."""
         if warm_start is None or warm_start.t_start > instance.problem.t_rep + 1e-9:
             return points
-        worst = max(residuals.values())
+        worst = _largest(residuals)
         if worst <= 0.0:
             return points
         model, t_rep = instance.model, instance.problem.t_rep
@@ -347,7 +347,7 @@ def _answered(instance: Instance, points: Array, residuals: dict[str, float]) ->
     """
     if points is not instance.relaxed or instance.model.structure.solver != "sqpmethod":
         return False
-    return not instance.problem.lateral and max(residuals.values()) <= 0.0 and instance.keeps_circle(points)
+    return not instance.problem.lateral and _largest(residuals) <= 0.0 and instance.keeps_circle(points)
 
 
 def _require(problem: RepairProblem) -> None:
@@ -379,6 +379,11 @@ def _gap(separation: Separation) -> str:
     below, above = (separation.who(row, side) for side in _SIDE_OF[axis])
     t = separation.times[row]
     return f"{below} and {above} leave no gap at t = {t:.2f} s"
+
+
+def _largest(residuals: dict[str, float]) -> float:
+    """The largest violation; NaN if one of them is."""
+    return float(np.maximum.reduce(tuple(residuals.values())))
 
 
 def _worst(residuals: dict[str, float]) -> str:

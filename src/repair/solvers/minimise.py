@@ -5,6 +5,7 @@ The cost is convex and has one minimum; which way leads there is a matter of spe
 
 from __future__ import annotations
 
+import math
 import time
 from typing import NamedTuple
 
@@ -64,21 +65,23 @@ def newton(
     ------
     OutOfTime
     """
-    u = cost.closed_form() if near_closed_form else np.zeros(cost.size)
-    here = cost(u)
-    if near_closed_form and not here.curvature.any():
-        return Minimum(cost.points(u), here.value, 1, True)
+    u, here = np.zeros(cost.size), None
+    if near_closed_form and (found := cost.closed_form()) is not None:
+        u, here = found, cost(found)
+        if not here.curvature.any():
+            return Minimum(cost.points(u), here.value, 1, True)
+    here = here or cost(u)
     for iteration in range(1, limit + 1):
         _in_time(deadline)
-        factor, failed = dpbtrf(cost.hessian(here), lower=1)
-        if failed:  # as flat as rounding makes it
+        factor, failed = _factored(cost.hessian(here))
+        if failed or not math.isfinite(here.value):
             return Minimum(cost.points(u), here.value, iteration - 1, False)
         step = dpbtrs(factor, here.gradient, lower=1)[0]
         descent = float(step.dot(here.gradient))
         share = 1.0
         moved = u - step
         there = cost(moved)
-        while there.value > here.value - _SUFFICIENT * share * descent:
+        while not there.value <= here.value - _SUFFICIENT * share * descent:
             share *= 0.5
             if share < _SHORTEST:  # rounding leaves no better point than this one
                 return Minimum(cost.points(u), here.value, iteration, descent <= tolerance * tolerance)
@@ -88,6 +91,19 @@ def newton(
         if float(dpbtrs(factor, here.gradient, lower=1)[0].dot(here.gradient)) <= tolerance * tolerance:
             return Minimum(cost.points(u), here.value, iteration, True)
     return Minimum(cost.points(u), here.value, limit, False)
+
+
+def _factored(band: Array) -> tuple[Array, int]:
+    """Cholesky factor of a band, and whether there is none.
+
+    Without a weight on smoothness some directions cost nothing; a whisper of it keeps them where they are.
+    """
+    factor, failed = dpbtrf(band, lower=1)
+    if failed:
+        band = np.array(band)
+        band[0] += 1e-9 * max(float(np.abs(band[0]).max()), 1e-9)
+        factor, failed = dpbtrf(band, lower=1)
+    return factor, failed
 
 
 def lbfgs(
@@ -109,7 +125,9 @@ def lbfgs(
     """
     from scipy.optimize import fmin_l_bfgs_b
 
-    factor = dpbtrf(cost.quadratic(), lower=1)[0] if precondition else None
+    factor, failed = _factored(cost.quadratic()) if precondition else (None, 1)
+    if failed:
+        factor = None
 
     def moved(y: Array) -> Array:
         return y if factor is None else dtbtrs(factor, y[:, None], uplo="L", trans="T")[0][:, 0]
@@ -124,4 +142,4 @@ def lbfgs(
     y, value, info = fmin_l_bfgs_b(
         evaluate, np.zeros(cost.size), maxiter=limit, pgtol=tolerance, factr=1e3, m=10, maxls=40
     )
-    return Minimum(cost.points(moved(y)), float(value), int(info["nit"]), info["warnflag"] != 1)
+    return Minimum(cost.points(moved(y)), float(value), int(info["nit"]), info["warnflag"] == 0)

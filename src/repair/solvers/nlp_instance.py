@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ __all__ = ["ROAD_SLACK", "TOLERANCE", "Instance", "plane_acceleration"]
 TOLERANCE = 1e-6  # largest violation of a curve that is called solved
 ROAD_SLACK = 0.5  # [m] of s either way of the last path over which the road must be wide enough
 _TIGHTEN = 1e-7  # bounds are taken in by this much, so that the solver's own tolerance stays inside
+_CROSSED = 5e-7  # of bounds that touch each other or nearly so
 _FRICTION = 0.995  # share of the friction circle used at the samples, for what happens in between
 _EDGE = 0.05  # [m] kept from the edge of the road
 _OWN = 0.05  # [m] by which the body's ends may always leave the axis' own
@@ -31,6 +33,11 @@ def axis_curvature(problem: RepairProblem, s: Array) -> tuple[Array, Array]:
     """Curvature of the axis and its slope over s (K,)."""
     kappa, ahead, behind = problem.curvature_at(s + _AROUND)
     return kappa, (ahead - behind) / (2.0 * _STEP)
+
+
+def _excess(*values: Any) -> float:
+    """The largest of 0 and these numbers; NaN if one of them is (the built-in ``max`` may lose it)."""
+    return float(np.maximum.reduce((0.0, *values)))
 
 
 def plane_acceleration(problem: RepairProblem, states: Array) -> tuple[Array, Array]:
@@ -159,6 +166,9 @@ class Instance:
             low[ends], high[ends] = self._room_of_ends(s, min(ROAD_SLACK, trust or _INF), _EDGE)
         low += _TIGHTEN
         high -= _TIGHTEN
+        # Where there is exactly room for one value, that is left no room by what was just taken.
+        crossed = ((low > high) & (low - high <= _CROSSED)).nonzero()[0]
+        low[crossed] = high[crossed] = 0.5 * (low[crossed] + high[crossed])
         return low, high
 
     def sample_data(self, points: Array) -> Array:
@@ -267,8 +277,8 @@ class Instance:
         kappa, slope = axis_curvature(problem, states[0, :, 0])
         along, across = _in_plane(kappa, slope, states)
         found = {
-            "friction": max(0.0, float(np.hypot(along, across).max()) - limits.a_total),
-            "lateral_acceleration": max(0.0, float(np.abs(across).max()) - limits.a_lat),
+            "friction": _excess(np.hypot(along, across).max() - limits.a_total),
+            "lateral_acceleration": _excess(np.abs(across).max() - limits.a_lat),
         }
         if problem.lateral:
             found["longitudinal_acceleration"] = max(
@@ -279,12 +289,12 @@ class Instance:
             square = forward**2 + w**2 + STANDSTILL
             speed = np.sqrt(square)
             bend = (forward * across - w * along) / (square * speed)
-            found["curvature"] = max(0.0, float(np.abs(bend).max()) - limits.curvature)
+            found["curvature"] = _excess(np.abs(bend).max() - limits.curvature)
             reach = self.model.structure.overhang
             middle, swing = l - 0.5 * reach**2 * kappa, reach * w / speed
             ends = np.concatenate((middle + swing, middle - swing))
             right, left = self._room_of_ends(s, 0.0, 0.0)
-            found["body_on_road"] = max(0.0, float((right - ends).max()), float((ends - left).max()))
+            found["body_on_road"] = _excess((right - ends).max(), (ends - left).max())
         return found
 
     def _road_violation(self, placed: Array) -> float:
@@ -295,4 +305,4 @@ class Instance:
         s, l = placed[:, 0][row], placed[:, 1][row]  # noqa: E741
         own = problem.start[0, 1]
         right, left = road_room(problem.bounds, s.min(axis=1), s.max(axis=1), own, own, 0.0)
-        return max(0.0, float((right - l.min(axis=1)).max()), float((l.max(axis=1) - left).max()))
+        return _excess((right - l.min(axis=1)).max(), (l.max(axis=1) - left).max())

@@ -189,6 +189,8 @@ class Model(Layout):
         rows = self.linear_count
         low, upper = low[:rows], high[:rows].copy()
         upper[self._soft] = np.inf
+        if (low > upper).any():
+            return None
         lba = np.concatenate((low, np.full(len(self._soft), -np.inf)))
         uba = np.concatenate((upper, high[self._soft]))
         g = np.append(1e-4 * slope, 100.0)
@@ -261,6 +263,8 @@ class Model(Layout):
             False if daqp has proven that the linear rows contradict each other: then so does the NLP.
         """
         rows = self.linear_count
+        if (low[:rows] > high[:rows]).any():
+            return None, False  # CasADi calls this an error
         with self._lock:
             out = self._qp(g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
             word = int(self._qp.stats()["return_status"])

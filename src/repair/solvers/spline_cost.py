@@ -168,11 +168,15 @@ class SplineCost:
             gradient += pull
         return Point(value, gradient, curvature)
 
-    def closed_form(self) -> Array:
-        """The u that minimises the quadratic part; the whole cost, where no penalty is active there."""
+    def closed_form(self) -> Array | None:
+        """The u that minimises the quadratic part; the whole cost, where no penalty is active there.
+
+        None where the quadratic part has no unique minimum.
+        """
         bent = self._structure.smooth * self._derivatives
         slope = self._structure.free.T.dot(bent.reshape(-1, self.axes)).ravel()
-        return -np.asarray(dpbtrs(dpbtrf(self.quadratic(), lower=1)[0], slope, lower=1)[0])
+        factor, failed = dpbtrf(self.quadratic(), lower=1)
+        return None if failed else -np.asarray(dpbtrs(factor, slope, lower=1)[0])
 
     def quadratic(self) -> Array:
         """Band of the Hessian where no penalty is active; see :meth:`hessian`."""
