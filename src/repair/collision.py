@@ -137,11 +137,11 @@ class CollisionWorld:
                 track[(late < 0) | (late >= len(rows)) | (self._before != self._after)] = np.nan
                 add(index, track, what, np.clip(late, 0, len(rows) - 1))
 
-        self._track = np.stack(tracks, axis=1) if tracks else np.empty((self.n_samples, 0, 5))
+        stacked = np.stack(tracks, axis=1) if tracks else np.empty((self.n_samples, 0, 5))
         self._owner = np.array(owner, dtype=np.intp)
         self._kind = np.array(kind, dtype=np.intp)
         self._step = steps
-        x, y, heading, *size = np.moveaxis(self._track, 2, 0)
+        x, y, heading, *size = np.moveaxis(stacked, 2, 0)
         # Points and directions of the plane as complex numbers: one call where coordinates take two.
         self._centre = _complex(x, y)
         self._axis = _complex(np.cos(heading), np.sin(heading))
