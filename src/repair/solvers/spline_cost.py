@@ -24,6 +24,9 @@ from repair.types import Array, frozen
 __all__ = ["Point", "SplineCost", "fitting_band"]
 
 _ORDERS = (1, 2, 3)
+# Up to this many entries one dense matrix makes everything that is bounded: on small problems calls are what
+# time is spent on. Beyond, the axes are kept apart and -x and the pairs are not multiplied out.
+_DENSE = 6000
 _NONE, _NOTHING = np.empty(0, dtype=np.intp), np.empty(0)
 
 
@@ -41,7 +44,8 @@ class _Structure:
     width: int  # of the band
     band: Array  # ((m axes) * (width + 1),): Hessian of lambda_s J_s
     factor: Array  # ((3n - 6) axes, 10): by which a row's curvature is added to the band,
-    where: npt.NDArray[np.intp]  # ((3n - 6) axes * 10,): and to which of its entries
+    where: npt.NDArray[np.intp]  # ((3n - 6) axes, 10): and to which of its entries
+    dense: Array | None  # (2 (3n - 6) axes, m axes): free coordinates to x and -x of all axes
 
 
 @lru_cache(maxsize=64)
@@ -64,8 +68,13 @@ def _structure(
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     factors = frozen(factor.reshape(-1, 10))
     band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
-    free = frozen(stack[:, first:last])
-    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, where.ravel())
+    free, dense = frozen(stack[:, first:last]), None
+    if 2 * free.size * axes**2 <= _DENSE:
+        x = np.kron(free, np.eye(axes))
+        dense = frozen(np.concatenate((x, -x)))
+    where = where.reshape(-1, 10)
+    where.setflags(write=False)
+    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, where, dense)
 
 
 class Point(NamedTuple):
@@ -119,7 +128,7 @@ class SplineCost:
         made = self._structure = _structure(n, axes, first, last, spacing, smooth, width)
         self._points, self._sign = points, sign
         self._bounds, self._fit, self._constant = bounds, fit, constant
-        self._coordinate = paired - first * axes  # of every pair, in u
+        self._coordinate = paired - first * axes if first else paired  # of every pair, in u
         self._rows = rows = len(made.smooth)
         self._band = made.band
         if fit is not None:
@@ -127,17 +136,16 @@ class SplineCost:
             self._band.reshape(self.size, width + 1)[:, : len(fit)] += fit.T
         x = (made.stack @ points).ravel()
         self._derivatives = x
-        self._limit = bounds.limit.copy()  # of what is added to the quantities at u = 0
-        self._limit[:rows] -= x
-        self._limit[rows : 2 * rows] += x
-        self._limit[2 * rows :] -= points.ravel()[paired] * sign
-        # What is bounded, filled anew in every evaluation: x, -x, and the paired coordinates.
-        self._quantities = np.empty(2 * rows + len(paired))
-        self._parts = (
-            self._quantities[:rows],
-            self._quantities[rows : 2 * rows],
-            self._quantities[2 * rows :],
-        )
+        self._limit = limit = bounds.limit.copy()  # of what is added to the quantities at u = 0
+        limit[:rows] -= x
+        limit[rows : 2 * rows] += x
+        self._matrix = made.dense
+        if len(paired):
+            limit[2 * rows :] -= points.ravel()[paired] * sign
+            if made.dense is not None:
+                self._matrix = matrix = np.zeros((len(limit), self.size))
+                matrix[: 2 * rows] = made.dense
+                matrix[np.arange(2 * rows, len(limit)), self._coordinate] = sign
 
     def points(self, u: Array) -> Array:
         """Control points (n, axes) at the displacements u."""
@@ -147,26 +155,36 @@ class SplineCost:
 
     def __call__(self, u: Array) -> Point:
         """Value, gradient and curvatures at u."""
-        rows, free = self._rows, self._structure.free
-        x, negative, paired = self._parts
-        change = free.dot(u.reshape(-1, self.axes)).ravel()
-        x[:] = change
-        np.negative(change, out=negative)
-        np.multiply(u.take(self._coordinate), self._sign, out=paired)
-        penalty, slope, curvature = self._bounds.evaluate(self._quantities, self._limit)
-        change += self._derivatives
-        bent = self._structure.smooth * change
-        value = self._constant + 0.5 * float(bent.dot(change)) + penalty
-        bent += slope[:rows]
-        bent -= slope[rows : 2 * rows]
-        gradient = free.T.dot(bent.reshape(-1, self.axes)).ravel()
-        if len(self._coordinate):
-            gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
+        rows = self._rows
+        quantities = self._bounded(u)
+        penalty, slope, curvature = self._bounds.evaluate(quantities, self._limit)
+        x = quantities[:rows] + self._derivatives
+        bent = self._structure.smooth * x
+        value = self._constant + 0.5 * float(bent.dot(x)) + penalty
+        slope[:rows] += bent
+        gradient = self._pulled_back(slope)
         if self._fit is not None:
             pull = dsbmv(len(self._fit) - 1, 1.0, self._fit, u, lower=1)
             value += 0.5 * float(pull.dot(u))
             gradient += pull
         return Point(value, gradient, curvature)
+
+    def _bounded(self, u: Array) -> Array:
+        """By what u changes everything that is bounded: x, -x, and the paired coordinates."""
+        if self._matrix is not None:
+            return np.asarray(self._matrix.dot(u))
+        x = self._structure.free.dot(u.reshape(-1, self.axes)).ravel()
+        return np.concatenate((x, -x, u.take(self._coordinate) * self._sign))
+
+    def _pulled_back(self, slope: Array) -> Array:
+        """The transposed map: from slopes of what is bounded to the gradient."""
+        if self._matrix is not None:
+            return np.asarray(slope.dot(self._matrix))
+        rows = self._rows
+        bent = slope[:rows] - slope[rows : 2 * rows]
+        gradient = self._structure.free.T.dot(bent.reshape(-1, self.axes)).ravel()
+        gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
+        return np.asarray(gradient)
 
     def closed_form(self) -> Array | None:
         """The u that minimises the quadratic part; the whole cost, where no penalty is active there.
@@ -184,12 +202,12 @@ class SplineCost:
 
     def hessian(self, point: Point) -> Array:
         """Band (width + 1, m * axes) of the Hessian at an evaluated point, in lower form."""
-        made, rows = self._structure, self._rows
+        made, rows, band = self._structure, self._rows, self._band
         curvature = point.curvature[:rows] + point.curvature[rows : 2 * rows]
-        band = self._band
-        if curvature.any():
-            added = made.factor * curvature[:, None]
-            band = band + np.bincount(made.where, added.ravel(), len(band))
+        active = curvature.nonzero()[0]
+        if len(active):
+            added = made.factor.take(active, axis=0) * curvature.take(active)[:, None]
+            band = band + np.bincount(made.where.take(active, axis=0).ravel(), added.ravel(), len(band))
         if len(self._coordinate):
             entry = self._coordinate * (made.width + 1)
             band = band + np.bincount(entry, point.curvature[2 * rows :], len(band))
