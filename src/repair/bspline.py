@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import comb, factorial
+from math import ceil, comb, factorial
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +70,7 @@ def derivative_matrix(n: int, order: int, spacing: float) -> Array:
 
 def n_points_for(duration: float, spacing: float, degree: int) -> int:
     """Number of control points whose span covers ``duration`` (at least one segment)."""
-    return max(1, int(np.ceil(duration / spacing - 1e-9))) + degree
+    return max(1, ceil(duration / spacing - 1e-9)) + degree
 
 
 def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order: int = 0) -> Array:
@@ -123,6 +123,11 @@ def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: flo
     return frozen(held.reshape(matrix.shape))
 
 
+@lru_cache(maxsize=64)
+def _greville(n: int, degree: int, spacing: float) -> Array:
+    return frozen((np.arange(n) - (degree - 1) / 2) * spacing)
+
+
 @dataclass(frozen=True)
 class UniformBSpline:
     """A uniform B-spline trajectory in the Frenet frame; implements :class:`repair.types.Curve`.
@@ -151,7 +156,7 @@ class UniformBSpline:
     @property
     def greville(self) -> Array:
         """Time (n,) at which each control point acts [s]."""
-        return self.t_start + (np.arange(len(self.points)) - (self.degree - 1) / 2) * self.spacing
+        return self.t_start + _greville(len(self.points), self.degree, self.spacing)
 
     def derivative_points(self, order: int) -> Array:
         """Control points (n - order, 2) of the derivative curve; their hull bounds it."""
@@ -211,18 +216,38 @@ def _fit_operator(n: int, degree: int, spacing: float, per_segment: int) -> tupl
     return frozen(tau), frozen(fitted), frozen(begin)
 
 
+@lru_cache(maxsize=64)
+def _refit_operator(
+    since: float, points: int, degree: int, spacing: float, n: int, new_degree: int, new_spacing: float
+) -> Array:
+    """Map (n, points) from a spline's control points to those of its fit from ``since`` its start on."""
+    tau, fitted, begin = _fit_operator(n, new_degree, new_spacing, 4)
+    samples = _sampling_at((since + tau).tobytes(), 0.0, points, degree, spacing).reshape(4, len(tau), points)
+    state = np.zeros((max(new_degree, 4), points))
+    state[:4] = samples[:, 0]
+    return frozen(fitted @ samples[0] + begin @ state[:new_degree])
+
+
 def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: float) -> UniformBSpline:
     """Least-squares spline through ``curve`` from ``t_start`` on, with its exact state there.
 
     Position, velocity and acceleration at ``t_start`` are reproduced exactly (and the jerk for
     degree 4 and up); the remaining control points fit the positions.
     """
-    tau, fitted, begin = _fit_operator(n, degree, spacing, 4)
-    samples = curve.sample(t_start + tau)
-    state = np.zeros((max(degree, 4), 2))
-    for row, column in enumerate((samples.position, samples.velocity, samples.acceleration, samples.jerk)):
-        state[row] = column[0]
-    points = fitted @ samples.position
-    points += begin @ state[:degree]
+    if isinstance(curve, UniformBSpline) and 4 * n * len(curve.points) <= _KEPT:
+        # Linear in the curve's control points, and searches ask for the same times over and over.
+        since = round(t_start - curve.t_start, 12)
+        fit = _refit_operator(since, len(curve.points), curve.degree, curve.spacing, n, degree, spacing)
+        points = fit @ curve.points
+    else:
+        tau, fitted, begin = _fit_operator(n, degree, spacing, 4)
+        samples = curve.sample(t_start + tau)
+        state = np.zeros((max(degree, 4), 2))
+        for row, column in enumerate(
+            (samples.position, samples.velocity, samples.acceleration, samples.jerk)
+        ):
+            state[row] = column[0]
+        points = fitted @ samples.position
+        points += begin @ state[:degree]
     points.setflags(write=False)
     return UniformBSpline(t_start, spacing, degree, points)
