@@ -68,7 +68,7 @@ def newton(
     u, here = np.zeros(cost.size), None
     if near_closed_form and (found := cost.closed_form()) is not None:
         u, here = found, cost(found)
-        if not here.curvature.any():
+        if not np.count_nonzero(here.curvature):
             return Minimum(cost.points(u), here.value, 1, True)
     here = here or cost(u)
     for iteration in range(1, limit + 1):
@@ -78,13 +78,15 @@ def newton(
             return Minimum(cost.points(u), here.value, iteration - 1, False)
         step = dpbtrs(factor, here.gradient, lower=1)[0]
         descent = float(step.dot(here.gradient))
+        if descent <= tolerance * tolerance:  # it began at the minimum
+            return Minimum(cost.points(u), here.value, iteration, True)
         share = 1.0
         moved = u - step
         there = cost(moved)
         while not there.value <= here.value - _SUFFICIENT * share * descent:
             share *= 0.5
             if share < _SHORTEST:  # rounding leaves no better point than this one
-                return Minimum(cost.points(u), here.value, iteration, descent <= tolerance * tolerance)
+                return Minimum(cost.points(u), here.value, iteration, False)
             moved = u - share * step
             there = cost(moved)
         u, here = moved, there

@@ -129,6 +129,7 @@ class SplineCost:
         self._points, self._sign = points, sign
         self._bounds, self._fit, self._constant = bounds, fit, constant
         self._coordinate = paired - first * axes if first else paired  # of every pair, in u
+        self._diagonal = self._coordinate * (width + 1)  # and in the band
         self._rows = rows = len(made.smooth)
         self._band = made.band
         if fit is not None:
@@ -208,9 +209,8 @@ class SplineCost:
         if len(active):
             added = made.factor.take(active, axis=0) * curvature.take(active)[:, None]
             band = band + np.bincount(made.where.take(active, axis=0).ravel(), added.ravel(), len(band))
-        if len(self._coordinate):
-            entry = self._coordinate * (made.width + 1)
-            band = band + np.bincount(entry, point.curvature[2 * rows :], len(band))
+        if len(self._diagonal):
+            band = band + np.bincount(self._diagonal, point.curvature[2 * rows :], len(band))
         return band.reshape(self.size, -1).T
 
 
@@ -228,6 +228,12 @@ def _knots(n: int, degree: int, spacing: float) -> tuple[Array, npt.NDArray[np.i
         products[: p - d, d] = values[: p - d] * values[d:]
     knots = np.arange(p, n - p)[:, None] - np.arange(p)
     return frozen(rates), knots, frozen(products)
+
+
+@lru_cache(maxsize=64)
+def _straight_band(n: int, degree: int, spacing: float, weight: float) -> Array:
+    _, knots, products = _knots(n, degree, spacing)
+    return frozen((np.full(n - degree + 1, 2.0 * weight / 25.0)[knots] @ products).T)
 
 
 def fitting_band(points: Array, degree: int, spacing: float, weight: float, axes: int) -> Array:
@@ -248,6 +254,8 @@ def fitting_band(points: Array, degree: int, spacing: float, weight: float, axes
     """
     p, count = degree, len(points) - degree + 1
     rates, knots, products = _knots(len(points), p, spacing)
+    if axes == 1 and not np.count_nonzero(points[:, 1]):
+        return _straight_band(len(points), p, spacing, weight)  # no part of the travel is sideways
     velocity = rates[0] * points[:count]
     for q in range(1, p):
         velocity += rates[q] * points[q : q + count]
