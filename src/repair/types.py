@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -149,6 +149,32 @@ class LateralBounds:
         return np.interp(query, self.s, self.right), np.interp(query, self.s, self.left)
 
 
+_KEPT = 1000  # times of a query whose places among the steps are kept
+
+
+@lru_cache(maxsize=64)
+def _steps_at(
+    times: bytes, start: float, step: float, count: int
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array | None, npt.NDArray[np.bool_] | None]:
+    """Where times lie among equally spaced steps: the steps below and above, and the weight of the upper one.
+
+    None for the weights where all times are on a step, and for which are outside where none is. Searches
+    ask for the same times over and over.
+    """
+    where = (np.frombuffer(times) - start) / step
+    nearest = np.rint(where)
+    off_step = np.abs(where - nearest) >= 1e-6
+    where = np.where(off_step, where, nearest)
+    below = np.floor(where)
+    low = below.astype(np.intp)
+    # On a step its own row counts alone: the next one may be NaN.
+    high = np.where(off_step, low + 1, low)
+    weight, outside = (where - below)[:, None], (where < 0) | (where > count - 1)
+    for kept in (low, high, weight, outside):
+        kept.setflags(write=False)
+    return low, high, weight if off_step.any() else None, outside if outside.any() else None
+
+
 @dataclass(frozen=True)
 class Occupancy:
     """Obstacles as boxes in (s, l, t), inflated so that the ego is a point.
@@ -176,26 +202,15 @@ class Occupancy:
 
     def at(self, times: npt.ArrayLike) -> tuple[Array, Array]:
         """Boxes (N, K, 2) at ``times`` (K,); NaN where an obstacle is absent or the time is outside."""
-        step = self.t[1] - self.t[0] if len(self.t) > 1 else 1.0
-        where = (np.asarray(times, dtype=np.float64) - self.t[0]) / step
-        nearest = np.rint(where)
-        off_step = np.abs(where - nearest) >= 1e-6
-        between = np.logical_or.reduce(off_step)
-        if between:
-            where = np.where(off_step, where, nearest)
-            low = np.floor(where).astype(np.intp)
-        else:
-            where = nearest
-            low = nearest.astype(np.intp)
+        query = np.asarray(times, dtype=np.float64)
+        step = self.t.item(1) - self.t.item(0) if len(self.t) > 1 else 1.0
+        look_up = _steps_at if query.size <= _KEPT else _steps_at.__wrapped__
+        low, high, weight, outside = look_up(query.tobytes(), self.t.item(0), step, len(self.t))
         lower, upper = self.lower.take(low, axis=1, mode="clip"), self.upper.take(low, axis=1, mode="clip")
-        if between:
-            # On a step its own row counts alone: the next one may be NaN.
-            high = np.where(off_step, low + 1, low)
-            weight = (where - low)[:, None]
+        if weight is not None:
             lower += weight * (self.lower.take(high, axis=1, mode="clip") - lower)
             upper += weight * (self.upper.take(high, axis=1, mode="clip") - upper)
-        outside = (where < 0) | (where > len(self.t) - 1)
-        if np.logical_or.reduce(outside):
+        if outside is not None:
             lower[:, outside] = np.nan
             upper[:, outside] = np.nan
         return lower, upper
