@@ -25,7 +25,7 @@ _PRESETS = Path(__file__).with_name("presets")
 class SearchConfig:
     """Algorithm 1."""
 
-    rule: str = "bisect"  # bisect | as_printed | scan
+    rule: str = "bisect"  # guided: fewer probes; scan: every one; as_printed: to the letter
     delta_t: float = 0.4  # resolution of the search grid [s]
     upper: float | None = None  # upper end [s]; null: TTC
     time_limit: float | None = None  # whole search [s]
@@ -204,7 +204,7 @@ class Config:
 
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "driver": ("f_ttr", "at_ttr"),
-    "search.rule": ("bisect", "as_printed", "scan"),
+    "search.rule": ("bisect", "guided", "scan", "as_printed"),
     "search.sides": ("best", "first"),
     "ego.solver": ("newton", "lbfgs"),
     "scene.after_prediction": ("remove", "hold", "constant_velocity"),

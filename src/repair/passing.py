@@ -36,6 +36,8 @@ _THROTTLE = (0.5, 1.0)
 _GAINS = (2.0, 5.0, 50.0)
 _DELAYS = (0.0, 1.5, 3.0)
 _HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
+# The cost of a way that is not open starts here, far above those of open ones.
+_SHUT = 1e3
 
 
 class _Family(NamedTuple):
@@ -413,7 +415,7 @@ def _closest(
         if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
             closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
     found = (closest[kind] for kind in wanted if kind in closest)
-    return {maneuver: (1e3 + badness, p, profile) for badness, p, profile, maneuver in found}
+    return {maneuver: (_SHUT + badness, p, profile) for badness, p, profile, maneuver in found}
 
 
 def _kinds(
@@ -448,7 +450,7 @@ def _passing(
     columns[0, :, 1], columns[1, :, 1], columns[2, :, 1] = profile.l, profile.rate, profile.acceleration
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
-    return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost)
+    return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost, cost < _SHUT)
 
 
 def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8]:

@@ -7,6 +7,7 @@ produce the iterates that the paper reports; rule ``as_printed`` visits what it 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -32,6 +33,8 @@ __all__ = ["Order", "ProblemSource", "TrajectoryChecker", "probe_order", "search
 
 #: Yields the next t_rep [s], is sent whether it was feasible.
 Order = Generator[float, bool, None]
+#: Whether a way past the obstacles seems to be open at a t_rep [s].
+IsOpen = Callable[[float], bool]
 
 
 class ProblemSource(Protocol):
@@ -52,12 +55,10 @@ class TrajectoryChecker(Protocol):
 
 def _grid_size(end: float, delta_t: float) -> int:
     """Number of grid points k * delta_t in [0, end)."""
-    import math
-
     return max(0, math.ceil(end / delta_t - 1e-9))
 
 
-def _bisect(end: float, delta_t: float) -> Order:
+def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
     feasible, infeasible = -1, _grid_size(end, delta_t)
     if infeasible == 0:
         return
@@ -73,12 +74,41 @@ def _bisect(end: float, delta_t: float) -> Order:
             infeasible = middle
 
 
-def _scan(end: float, delta_t: float) -> Order:
+def _guided(end: float, delta_t: float, is_open: IsOpen) -> Order:
+    size = _grid_size(end, delta_t)
+    feasible, infeasible = -1, size
+    k, stride = _last_open(size, delta_t, is_open), 1
+    while infeasible - feasible > 1:
+        k = min(max(k, feasible + 1), infeasible - 1)
+        if (yield k * delta_t):
+            feasible = k
+        else:
+            infeasible = k
+        if feasible >= 0 and infeasible < size:
+            k = (feasible + infeasible) // 2
+        else:  # on in the same direction, twice as far each time, until there is an answer of each kind
+            k += stride if feasible == k else -stride
+            stride *= 2
+
+
+def _last_open(size: int, delta_t: float, is_open: IsOpen) -> int:
+    """Where on the grid the ways past the obstacles seem to shut, by bisection: the last open point, or 0."""
+    found, shut = 0, size
+    while shut - found > 1:
+        middle = (found + shut) // 2
+        if is_open(middle * delta_t):
+            found = middle
+        else:
+            shut = middle
+    return found
+
+
+def _scan(end: float, delta_t: float, is_open: IsOpen) -> Order:
     for k in range(_grid_size(end, delta_t)):
         yield k * delta_t
 
 
-def _as_printed(end: float, delta_t: float) -> Order:
+def _as_printed(end: float, delta_t: float, is_open: IsOpen) -> Order:
     start, t_rep = 0.0, 0.0
     while abs(end - start) > delta_t + 1e-12:
         if (yield t_rep):
@@ -88,23 +118,29 @@ def _as_printed(end: float, delta_t: float) -> Order:
         t_rep = 0.5 * (start + end)
 
 
-_RULES: dict[str, Callable[[float, float], Order]] = {
+_RULES: dict[str, Callable[[float, float, IsOpen], Order]] = {
+    "guided": _guided,
     "bisect": _bisect,
     "scan": _scan,
     "as_printed": _as_printed,
 }
 
 
-def probe_order(rule: str, end: float, delta_t: float) -> Order:
+def probe_order(rule: str, end: float, delta_t: float, is_open: IsOpen = lambda t_rep: True) -> Order:
     """The times-to-repair that a rule visits below ``end`` [s].
 
     Parameters
     ----------
     rule : str
-        ``bisect``: t_rep = 0, then bisection on the grid, assuming that feasibility is contiguous;
-        ``scan``: every grid point, which assumes nothing; ``as_printed``: Algorithm 1 to the letter.
+        ``guided``: from the last grid point at which a way past the obstacles is open on, to where
+        feasible and infeasible meet; ``bisect``: t_rep = 0, then bisection on the grid; both assume
+        that feasibility is contiguous. ``scan``: every grid point, which assumes nothing;
+        ``as_printed``: Algorithm 1 to the letter.
+    is_open : callable
+        Whether a way past the obstacles is open at a t_rep [s]: a guess at feasibility that costs
+        little. Only ``guided`` asks, and a wrong answer costs it probes, nothing else.
     """
-    return _RULES[rule](end, delta_t)
+    return _RULES[rule](end, delta_t, is_open)
 
 
 class _OutOfTime(Exception):
@@ -210,7 +246,19 @@ def iter_probes(
         Upper end of the search [s], excluded: the reference is in conflict there.
     """
     budget = _Budget(settings.time_limit, clock(), clock)
-    order = probe_order(settings.rule, end, settings.delta_t)
+    made: dict[float, Sequence[RepairProblem]] = {}
+
+    def problems_at(t_rep: float) -> Sequence[RepairProblem]:
+        if t_rep not in made:
+            made[t_rep] = source.at(t_rep)
+        return made[t_rep]
+
+    def is_open(t_rep: float) -> bool:
+        return not budget.spent and any(
+            problem.passing is None or problem.passing.open for problem in problems_at(t_rep)
+        )
+
+    order = probe_order(settings.rule, end, settings.delta_t, is_open)
     warm_start: Curve | None = None
     answer: bool | None = None
     while True:
@@ -220,7 +268,7 @@ def iter_probes(
             return
         if budget.spent:
             raise _OutOfTime
-        probe = _probe(t_rep, source.at(t_rep), backend, checker, settings.sides, warm_start, budget)
+        probe = _probe(t_rep, problems_at(t_rep), backend, checker, settings.sides, warm_start, budget)
         for problems in _relaxed(source, backend, t_rep):
             if probe.feasible or budget.spent:
                 break

@@ -260,23 +260,26 @@ class Side(int, Enum):
 
 @dataclass(frozen=True)
 class Passing:
-    """One way past the obstacles: a coarse collision-free guide, and the side it takes of each.
+    """One way past the obstacles: a coarse guide, and the side it takes of each.
 
     Attributes
     ----------
     maneuver : Maneuver
     guide : FrenetTrajectory
-        The coarse trajectory that shows the way is open; an initial guess, not a result.
+        The coarse trajectory that shows the way; an initial guess, not a result.
     side : (N, K) int array
         :class:`Side` of every obstacle at each guide time (constant between guide times).
     cost : float
         The guide's cost; smaller is gentler.
+    open : bool
+        Whether the guide keeps clear of every box and within the limits; if not, it comes closest to that.
     """
 
     maneuver: Maneuver
     guide: FrenetTrajectory
     side: npt.NDArray[np.int8]
     cost: float
+    open: bool = True
 
     def side_at(self, times: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """Side of every obstacle (N, K') at ``times``: that of the nearest guide time."""

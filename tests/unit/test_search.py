@@ -31,18 +31,20 @@ class FakeSource:
 
     maneuvers: tuple[Maneuver | None, ...] = (Maneuver.YIELD,)
     asked: list[float] = field(default_factory=list)
+    open_until: float = float("inf")  # later guides only come closest
 
     def at(self, t_rep):
         self.asked.append(t_rep)
         return tuple(
-            toy.problem((), t_rep=t_rep, t_end=t_rep + 2.0, passing=self.passing(m)) for m in self.maneuvers
+            toy.problem((), t_rep=t_rep, t_end=t_rep + 2.0, passing=self.passing(m, t_rep))
+            for m in self.maneuvers
         )
 
-    @staticmethod
-    def passing(maneuver):
+    def passing(self, maneuver, t_rep):
         if maneuver is None:
             return None
-        return Passing(maneuver, toy.constant().sample(np.arange(3.0)), np.zeros((0, 3), dtype=np.int8), 0.0)
+        guide, side = toy.constant().sample(np.arange(3.0)), np.zeros((0, 3), dtype=np.int8)
+        return Passing(maneuver, guide, side, 0.0, t_rep <= self.open_until + 1e-9)
 
 
 @dataclass
@@ -149,7 +151,7 @@ def test_as_printed_ends_where_nothing_is_feasible():
     assert result.status is SearchStatus.NONE_FEASIBLE
 
 
-@pytest.mark.parametrize("rule", ["bisect", "scan", "as_printed"])
+@pytest.mark.parametrize("rule", ["guided", "bisect", "scan", "as_printed"])
 @pytest.mark.parametrize("delta_t", [0.1, 0.3, 0.4, 0.7])
 @pytest.mark.parametrize("ttc", [0.05, 0.4, 0.8, 1.2, 2.4, 2.8, 2.9, 2.9000000000000004, 6.000000000000001])
 def test_no_rule_reaches_the_conflict_or_asks_twice(rule, delta_t, ttc):
@@ -186,6 +188,52 @@ def test_bisect_finds_what_scan_finds_where_feasibility_is_contiguous(delta_t, l
     assert bisect.f_ttr == pytest.approx(scan.f_ttr)
     assert len(bisect.probes) <= np.ceil(np.log2(2.9 / delta_t)) + 2
     assert len(scan.probes) == np.ceil(2.9 / delta_t)
+
+
+@pytest.mark.parametrize("delta_t", [0.1, 0.4])
+@pytest.mark.parametrize("latest", [-1.0, 0.0, 0.3, 0.8, 1.25, 2.8])
+@pytest.mark.parametrize("open_until", [-1.0, 0.0, 0.35, 1.2, 2.4, 9.0])
+def test_guided_finds_what_scan_finds_whatever_the_guides_say(delta_t, latest, open_until):
+    source = FakeSource(open_until=open_until)
+    guided = search(until(latest), 2.9, source=source, rule="guided", delta_t=delta_t)
+    scan = search(until(latest), 2.9, rule="scan", delta_t=delta_t)
+    assert guided.f_ttr == (None if scan.f_ttr is None else pytest.approx(scan.f_ttr))
+    assert guided.complete
+    # twice as far each time, then halves: a logarithm for each
+    assert len(guided.probes) <= 2 * np.ceil(np.log2(2.9 / delta_t)) + 2
+    assert len({round(t, 9) for t in source.asked}) == len(source.asked)  # what was made is kept
+
+
+@pytest.mark.parametrize(
+    "latest, open_until, expected",
+    [
+        (1.2, 1.2, [1.2, 1.6]),
+        (0.8, 1.2, [1.2, 0.8]),
+        (2.8, 9.0, [2.8]),
+        (1.6, 0.4, [0.4, 0.8, 1.6, 2.8, 2.0]),
+        (0.4, 2.8, [2.8, 2.4, 1.6, 0.0, 0.8, 0.4]),
+        (-1.0, -1.0, [0.0]),
+        (-1.0, 0.8, [0.8, 0.4, 0.0]),
+    ],
+)
+def test_guided_begins_where_the_ways_shut(latest, open_until, expected):
+    source = FakeSource(open_until=open_until)
+    result = search(until(latest), 2.9, source=source, rule="guided", delta_t=0.4)
+    assert visited(result) == pytest.approx(expected)
+
+
+def test_guided_goes_by_any_open_way():
+    class Sides(FakeSource):
+        def passing(self, maneuver, t_rep):
+            self.open_until = 0.4 if maneuver is Maneuver.YIELD else 1.6
+            return super().passing(maneuver, t_rep)
+
+    source = Sides((Maneuver.YIELD, Maneuver.LEFT))
+    assert visited(search(until(1.6), 2.9, source=source, rule="guided", delta_t=0.4)) == pytest.approx(
+        [1.6, 2.0]
+    )
+    without = visited(search(until(2.8), 2.9, source=FakeSource((None,)), rule="guided", delta_t=0.4))
+    assert without == pytest.approx([2.8])  # nothing is in the way
 
 
 def test_probe_order_is_a_generator_that_is_told_the_answers():
@@ -249,7 +297,7 @@ def test_a_margin_violated_at_the_start_leaves_zero_as_the_only_candidate():
     assert result.status is SearchStatus.FOUND
 
 
-@pytest.mark.parametrize("rule", ["bisect", "scan", "as_printed"])
+@pytest.mark.parametrize("rule", ["guided", "bisect", "scan", "as_printed"])
 def test_nothing_feasible_is_none_and_not_zero(rule):
     result = search(until(-1.0), 2.9, rule=rule)
     assert result.status is SearchStatus.NONE_FEASIBLE
@@ -354,7 +402,9 @@ def test_time_limit_zero_asks_nobody():
 def test_time_limit_cuts_the_sides_of_a_probe():
     clock = BentClock()
     backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
-    result = search(until(9.0), source=FakeSource(BOTH), backend=backend, clock=clock, time_limit=0.5)
+    result = search(
+        until(9.0), source=FakeSource(BOTH), backend=backend, clock=clock, time_limit=0.5, rule="bisect"
+    )
     assert len(result.probes) == 1
     assert len(result.probes[0].tried) == 1
     assert result.f_ttr == 0.0
@@ -422,7 +472,7 @@ def test_a_stop_iteration_inside_a_backend_does_not_end_the_search_as_complete()
 
 def test_the_last_feasible_curve_is_offered_as_a_warm_start():
     backend = FakeBackend()
-    result = search(until(0.8), 1.6, backend=backend, delta_t=0.4)
+    result = search(until(0.8), 1.6, backend=backend, delta_t=0.4, rule="bisect")
     assert backend.warm[0] is None
     assert backend.warm[1] is result.probes[0].solve.curve
     assert backend.warm[2] is result.probes[1].solve.curve

@@ -140,7 +140,9 @@ def _closest(pairs: Pairs, points: Array) -> float:
 def _bend_speed(problem: RepairProblem, points: Array) -> Array:
     """Speed (n - 1,) at which the bends along the control points use 0.8 of the lateral limit."""
     bend = np.abs(problem.curvature_at(points[:, 0]))
-    return np.sqrt(0.8 * problem.limits.a_lat / np.maximum(np.maximum(bend[1:], bend[:-1]), _STRAIGHT))
+    return np.asarray(
+        np.sqrt(0.8 * problem.limits.a_lat / np.maximum(np.maximum(bend[1:], bend[:-1]), _STRAIGHT))
+    )
 
 
 def _standing(points: Array, degree: int) -> Array:

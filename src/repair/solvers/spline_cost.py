@@ -72,9 +72,9 @@ def _structure(
     if 2 * free.size * axes**2 <= _DENSE:
         x = np.kron(free, np.eye(axes))
         dense = frozen(np.concatenate((x, -x)))
-    where = where.reshape(-1, 10)
-    where.setflags(write=False)
-    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, where, dense)
+    entries = where.reshape(-1, 10)
+    entries.setflags(write=False)
+    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, entries, dense)
 
 
 class Point(NamedTuple):
