@@ -28,7 +28,7 @@ BACKENDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "casadi sqpmethod": ("casadi", ("casadi.solver=sqpmethod",)),
     "casadi ipopt": ("casadi", ("casadi.solver=ipopt",)),
 }
-#: The same with the search rule that takes fewer plans; the others bisect, as the literal search and the paper do.
+#: The same with the rule that takes fewer plans; the others bisect, as the literal search does.
 GUIDED: dict[str, tuple[str, tuple[str, ...]]] = {
     f"{name}, guided": (backend, (*own, "search.rule=guided")) for name, (backend, own) in BACKENDS.items()
 }
@@ -122,7 +122,7 @@ class Case:
 
 
 def case(path: Path, number: int, backend: str, *overrides: str, scene: Scene | None = None) -> Case:
-    """Prepare a scenario for a backend (a name of :data:`BACKENDS` or :data:`GUIDED`), with the preset of that scenario."""
+    """Prepare a scenario, with its preset, for a name of :data:`BACKENDS` or :data:`GUIDED`."""
     name, own = (BACKENDS | GUIDED)[backend]
     config = load_config(preset=f"scenario_{number}", backend=name, overrides=[*own, *overrides])
     return Case(prepare(scene or scene_of(path), config), make_backend(name, config), config)
