@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from benchmarks import literal
@@ -139,6 +141,35 @@ def test_fit_reproduces_a_spline_on_the_same_knots(degree):
     np.testing.assert_allclose(fitted.points, spline.points[3:], atol=5e-4)
     t = np.linspace(1.2, spline.t_end, 50)
     np.testing.assert_allclose(fitted.sample(t).position, spline.sample(t).position, atol=1e-4)
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A curve of which nothing is known but what it answers."""
+
+    curve: UniformBSpline
+
+    @property
+    def t_start(self):
+        return self.curve.t_start
+
+    @property
+    def t_end(self):
+        return self.curve.t_end
+
+    def sample(self, t):
+        return self.curve.sample(t)
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("t_start", [0.0, 0.4, 0.73, 4.0])  # the last one reaches beyond the end
+def test_fit_to_a_spline_is_the_fit_to_any_curve(degree, t_start):
+    for of_degree, spacing in ((3, 0.5), (4, 0.3)):
+        spline = random_spline(of_degree, seed=11, t_start=0.0, n=of_degree + 14, spacing=spacing)
+        fitted = fit_to_curve(spline, t_start, degree + 6, degree, 0.4)
+        plain = fit_to_curve(Hidden(spline), t_start, degree + 6, degree, 0.4)
+        np.testing.assert_allclose(fitted.points, plain.points, rtol=1e-9, atol=1e-9)
+        assert (fitted.t_start, fitted.degree, fitted.spacing) == (t_start, degree, 0.4)
 
 
 @pytest.mark.parametrize("degree", DEGREES)

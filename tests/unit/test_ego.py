@@ -13,7 +13,7 @@ from tests import toy
 
 from repair.bspline import UniformBSpline, fit_to_curve, n_points_for
 from repair.config import DeformWeights, EgoConfig, RefineWeights
-from repair.solvers import ego
+from repair.solvers import ego, minimise, spline_cost
 from repair.types import FrenetTrajectory, Maneuver, Passing, Side, SolveResult, SolveStatus, frozen
 
 # The paper's two stages and nothing else.
@@ -108,6 +108,58 @@ def test_gradients_and_hessians_by_finite_differences(monkeypatch, side, lateral
                 bent = (ahead.gradient - behind.gradient) / (2.0 * step)
                 room = 1e-4 * np.abs(hessian @ direction).max() + 1e-9 * np.abs(point.gradient).max() / step
                 np.testing.assert_allclose(hessian @ direction, bent, atol=room)
+
+
+@pytest.mark.parametrize("side, lateral, t_end, spacing", CASES)
+def test_small_and_large_problems_are_evaluated_alike(monkeypatch, side, lateral, t_end, spacing):
+    """One dense matrix below a size, the structure of the spline above it."""
+    problem = make_problem(side, t_end=t_end, lateral=lateral, reference=swerving_reference(18))
+    costs = []
+    for size in (10**9, 0):
+        monkeypatch.setattr(spline_cost, "_DENSE", size)
+        spline_cost._structure.cache_clear()
+        made = run(monkeypatch, problem, spacing=spacing)
+        costs.append((made.deformation, made.refinement))
+    monkeypatch.undo()
+    spline_cost._structure.cache_clear()
+    rng = np.random.default_rng(2)
+    for dense, structured in zip(*costs, strict=True):
+        assert (dense._matrix is None, structured._matrix is None) == (False, True)
+        for metre in (0.0, 0.3, 4.0):
+            u = metre * rng.normal(size=dense.size)
+            one, other = dense(u), structured(u)
+            assert one.value == pytest.approx(other.value, rel=1e-9)
+            room = 1e-9 * (1.0 + np.abs(one.gradient).max())
+            np.testing.assert_allclose(one.gradient, other.gradient, rtol=1e-9, atol=room)
+            np.testing.assert_allclose(dense.hessian(one), structured.hessian(other), rtol=1e-9, atol=1e-9)
+
+
+class Shifted:
+    """A cost with another place to begin at, and how often it was evaluated."""
+
+    def __init__(self, cost, begin):
+        self.cost, self.begin, self.size, self.evaluated = cost, begin, cost.size, 0
+
+    def __call__(self, u):
+        self.evaluated += 1
+        return self.cost(self.begin + u)
+
+    def hessian(self, point):
+        return self.cost.hessian(point)
+
+    def points(self, u):
+        return self.cost.points(self.begin + u)
+
+
+def test_newton_takes_no_step_from_the_minimum(monkeypatch):
+    cost = run(monkeypatch, make_problem(Side.BEHIND)).deformation
+    exact = minimise.newton(cost, 100, 1e-9)
+    begin = (exact.points - cost.points(np.zeros(cost.size)))[cost.free].ravel()
+    again = Shifted(cost, begin)
+    minimum = minimise.newton(again, 100, 1e-6)
+    assert again.evaluated == 1
+    assert minimum.converged
+    np.testing.assert_array_equal(minimum.points, cost.points(begin))
 
 
 def from_band(band):
