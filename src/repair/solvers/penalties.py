@@ -52,21 +52,20 @@ class SoftBounds(NamedTuple):
         """Sum of the weighted penalties of quantities (K,), and the slope and curvature of each.
 
         Written around the joint without a branch: t = min(e, D) of an excess e gives t**3 +
-        3 D (e - t) (D + e - t), the slope 3 t**2 + 6 D (e - t) and the curvature 6 t.
+        3 D (e - t) e, the slope 3 t**2 + 6 D (e - t) and the curvature 6 t.
         ``limit`` stands in for the own one.
         """
-        rest = x - (self.limit if limit is None else limit)
-        np.maximum(rest, _ZERO, out=rest)
-        cubic = np.minimum(rest, self.joint)
-        rest -= cubic
+        excess = x - (self.limit if limit is None else limit)
+        np.maximum(excess, _ZERO, out=excess)
+        cubic = np.minimum(excess, self.joint)
         curvature = self.sixfold * cubic
         slope = _HALF * curvature
         slope *= cubic
         value = float(slope.dot(cubic)) / 3.0
-        beyond = self.bend * rest
+        beyond = excess - cubic
+        beyond *= self.bend
         slope += beyond
-        rest += self.joint
-        return value + 0.5 * float(beyond.dot(rest)), slope, curvature
+        return value + 0.5 * float(beyond.dot(excess)), slope, curvature
 
 
 def feasibility_bounds(
