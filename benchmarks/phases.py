@@ -22,7 +22,7 @@ CHECKS = {
     "driven states": "repair.checker:body_angles",
     "limits": "repair.checker:Checker._limits",
     "margin check": "repair.checker:Checker._margin",
-    "collision check": "repair.collision:CollisionWorld.contact",
+    "collision check": "repair.collision:CollisionWorld.contact_along",
     "road check": "repair.checker:Checker._off_road",
     "kinematic check, direct": "repair.checker:Checker._kinematics",
     "kinematic check, drivability checker": "repair.checker:official_check",

@@ -99,12 +99,13 @@ _KEPT = 40_000  # times * points of the largest matrix that is kept: 1.3 MB
 @lru_cache(maxsize=64)
 def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
     tau = np.frombuffer(offsets)
-    return frozen(np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)]))
+    matrix = np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)])
+    return frozen(np.ascontiguousarray(matrix.T))
 
 
 @lru_cache(maxsize=64)
 def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
-    """Matrix (4 K, n) from control points to position and three derivatives at ``times``.
+    """Matrix (n, 4 K) from control points to position and three derivatives at ``times``.
 
     Beyond the span the end speed is held, which is linear in the control points as well.
     """
@@ -117,9 +118,9 @@ def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: flo
     out = np.flatnonzero(np.abs(beyond) > 1e-9)
     if not len(out):
         return matrix
-    held = matrix.reshape(4, len(tau), n).copy()
-    held[0, out] += beyond[out, None] * held[1, out]
-    held[2:, out] = 0.0
+    held = matrix.reshape(n, 4, len(tau)).copy()
+    held[:, 0, out] += beyond[out] * held[:, 1, out]
+    held[:, 2:, out] = 0.0
     return frozen(held.reshape(matrix.shape))
 
 
@@ -179,7 +180,8 @@ class UniformBSpline:
         matrix = made(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
-        position, velocity, acceleration, jerk = (matrix @ self.points).reshape(4, len(times), 2)
+        # By columns: two long products, and s and l lie in one piece each.
+        position, velocity, acceleration, jerk = (self.points.T @ matrix).reshape(2, 4, -1).transpose(1, 2, 0)
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 
@@ -222,7 +224,7 @@ def _refit_operator(
 ) -> Array:
     """Map (n, points) from a spline's control points to those of its fit from ``since`` its start on."""
     tau, fitted, begin = _fit_operator(n, new_degree, new_spacing, 4)
-    samples = _sampling_at((since + tau).tobytes(), 0.0, points, degree, spacing).reshape(4, len(tau), points)
+    samples = _sampling_at((since + tau).tobytes(), 0.0, points, degree, spacing).T.reshape(4, -1, points)
     state = np.zeros((max(new_degree, 4), points))
     state[:4] = samples[:, 0]
     return frozen(fitted @ samples[0] + begin @ state[:new_degree])

@@ -91,8 +91,7 @@ class _Followed:
 
     reference: Curve
     t_end: float
-    position: Array
-    velocity: Array
+    motion: Array
     slip: Array
 
 
@@ -162,7 +161,7 @@ class Checker:
         path, s, slip0 = self._spliced(problem, after, times, first)
         if not _finite(path):
             return _NOT_FINITE
-        slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle, slip0)
+        slip, orientation = body_angles(path, self.scene.vehicle, slip0)
         found = self._limits(path, len(path.t) - len(after), problem.t_rep) if self.config.limits else []
         if self.config.margin:
             found += self._margin(problem, curve, after)
@@ -181,11 +180,12 @@ class Checker:
 
     def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
         """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
-        sampled = reference.sample(self.times(t_end))
-        path = self.scene.frame.cartesian(sampled)
-        slip, orientation = body_angles(path.heading, path.speed, path.distance, self.scene.vehicle)
-        self._followed = _Followed(reference, t_end, sampled.position, sampled.velocity, slip)
-        return path, sampled.position[:, 0], slip, orientation
+        times = self.times(t_end)
+        motion = _motion(reference.sample(times), len(times))
+        path = self.scene.frame.carry(times, motion)
+        slip, orientation = body_angles(path, self.scene.vehicle)
+        self._followed = _Followed(reference, t_end, motion, slip)
+        return path, motion[0], slip, orientation
 
     def _kept(self, reference: Curve, t_end: float) -> _Followed:
         """What was kept of the reference, at least until ``t_end``."""
@@ -203,20 +203,19 @@ class Checker:
         Also the arc lengths, and the slip angle to begin with; at the start there is no history and no
         slip angle (None).
         """
-        frame, late = self.scene.frame, len(times) - len(after)
-        if late == first == 0:
-            return frame.cartesian(after), after.position[:, 0], None
-        kept = self._kept(problem.reference, problem.t_end)
-        position = np.concatenate((kept.position[first:late], after.position))
-        velocity = np.concatenate((kept.velocity[first:late], after.velocity))
-        path = frame.carry(times[first:], position, velocity)
-        return path, position[:, 0], None if first == 0 else float(kept.slip[first])
+        late, slip0 = len(times) - len(after), None
+        motion = _motion(after, len(times) - first)
+        if late:
+            kept = self._kept(problem.reference, problem.t_end)
+            motion[:, : late - first] = kept.motion[:, first:late]
+            slip0 = None if first == 0 else float(kept.slip[first])
+        return self.scene.frame.carry(times[first:], motion), motion[0], slip0
 
     def _clear(self, path: CartesianPath, s: Array, orientation: Array, first_sample: int) -> list[Violation]:
         """First contact with an obstacle and first departure from the road."""
         found = []
-        centre = np.ascontiguousarray(path.xy).view(np.complex128)[:, 0]
-        contact = self.world.contact(centre.real, centre.imag, orientation, first_sample)
+        centre = path.xy.view(np.complex128)[:, 0]
+        contact = self.world.contact_along(centre, orientation, first_sample, path.longest)
         if contact is not None:
             behind = " from behind" if contact.from_behind else ""
             detail = f"obstacle {contact.obstacle_id}{behind}"
@@ -277,16 +276,14 @@ class Checker:
         limits, since = self.limits, max(late - 1, 0)
         if len(path.t) - since < 2:
             return False
-        rows = np.array((path.speed[since:], path.heading[since:]))
-        change = rows[:, 1:] - rows[:, :-1]
+        speed = path.speed[since:]
+        change = speed[1:] - speed[:-1]
         rate = 1.0 / float(path.t[1] - path.t[0])
-        v_low, v_high = float(np.minimum.reduce(rows[0])), float(np.maximum.reduce(rows[0]))
-        (a_low, left), (a_high, right) = (
-            np.minimum.reduce(change, axis=1).tolist(), np.maximum.reduce(change, axis=1).tolist(),
-        )  # fmt: skip
-        lateral = max(-v_low, v_high) * max(-left, right)
+        v_high = float(np.maximum.reduce(speed))
+        a_low, a_high = float(np.minimum.reduce(change)), float(np.maximum.reduce(change))
+        lateral = max(-path.slowest, v_high) * path.sharpest
         return (
-            v_low >= -STANDSTILL
+            path.slowest >= -STANDSTILL
             and v_high <= limits.v_max
             and a_low * rate >= limits.a_min
             and a_high * rate <= limits.a_max
@@ -341,9 +338,16 @@ class Checker:
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
 
 
+def _motion(trajectory: FrenetTrajectory, count: int) -> Array:
+    """The last of ``count`` samples of s, l and their rates (4, count); those before are left open."""
+    motion = np.empty((4, count))
+    start = count - len(trajectory)
+    motion[:2, start:], motion[2:, start:] = trajectory.position.T, trajectory.velocity.T
+    return motion
+
+
 def _finite(path: CartesianPath) -> bool:
-    if len(path.t) > 1 and math.isfinite(
-        path.distance[-1] + np.add.reduce(path.heading) + np.add.reduce(path.speed)
-    ):
-        return True  # a point that is not finite would make the distance so
+    # A point or a heading that is not finite would make the longest step or the sharpest turn so.
+    if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
+        return True
     return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))

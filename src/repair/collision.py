@@ -7,7 +7,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 
 from __future__ import annotations
 
-import cmath
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,6 +31,7 @@ Index = npt.NDArray[np.intp]
 _TOUCH = 1e-6
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
+_CLOCKWISE = np.array(-1j)  # an array, because NumPy takes long to convert a plain number
 
 
 class Contact(NamedTuple):
@@ -143,26 +144,28 @@ class CollisionWorld:
         self._step = steps
         x, y, heading, *size = np.moveaxis(stacked, 2, 0)
         # Points and directions of the plane as complex numbers: one call where coordinates take two.
-        self._centre = _complex(x, y)
-        self._axis = _complex(np.cos(heading), np.sin(heading))
-        self._size = np.stack(size, axis=2).reshape(-1, 2)  # (samples * tracks, 2)
+        centre = _complex(x, y)
+        axis = _complex(np.cos(heading), np.sin(heading))
+        # (3, samples * tracks): centre, and from there to two corners
+        diagonal = _complex(*size)
+        self._shapes = np.stack((centre, axis * diagonal, axis * diagonal.conj())).reshape(3, -1)
+        self._axis, self._size = axis.ravel(), np.stack(size, axis=2).reshape(-1, 2)
         radius = np.where(self._kind == _RECTANGLE, np.hypot(*size), size[0])
         self._round = bool((self._kind != _RECTANGLE).any())
-        self._build_blocks(radius + ego_radius)
+        self._build_blocks(centre, radius + ego_radius)
 
-    def _build_blocks(self, reach: Array) -> None:
+    def _build_blocks(self, centre: Points, reach: Array) -> None:
         """A circle around each track over each block of samples, what the ego needs included."""
         size = self._block = 2 * self.substeps
         count = -(-self.n_samples // size)
         padded = np.full((3, count * size, len(self._kind)), np.nan)
-        padded[:, : self.n_samples] = self._centre.real, self._centre.imag, reach
+        padded[:, : self.n_samples] = centre.real, centre.imag, reach
         x, y, padded_reach = padded.reshape(3, count, size, -1)
         # fmin and fmax pass over the samples at which an obstacle is not there
         middle = [0.5 * (np.fmin.reduce(v, axis=1) + np.fmax.reduce(v, axis=1)) for v in (x, y)]
         self._block_centre = _complex(*middle)
         away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
         self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
-        self._block_samples = np.arange(count * size).reshape(count, size)
 
     def _interpolate(self, rows: Array) -> Array:
         """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
@@ -176,7 +179,7 @@ class CollisionWorld:
         self, x: Array, y: Array, orientation: Array, start: int = 0
     ) -> tuple[float, int] | None:
         """Time [s] and obstacle id of the first collision, or None; arguments as in :meth:`contact`."""
-        found = self._first(x, y, orientation, start)
+        found = self._first(_complex(x, y), orientation, start)
         if found is None:
             return None
         return (start + found[0]) * self.dt / self.substeps, self._obstacles[found[1]].id
@@ -202,17 +205,25 @@ class CollisionWorld:
         ValueError
             If the samples reach beyond the scenario or are not finite.
         """
-        found = self._first(x, y, orientation, start)
+        return self.contact_along(_complex(x, y), orientation, start)
+
+    def contact_along(
+        self, here: Points, orientation: Array, start: int = 0, step: float | None = None
+    ) -> Contact | None:
+        """As :meth:`contact`, of centres x + iy (K,); ``step`` is how far two of them are apart at most [m]."""
+        found = self._first(here, orientation, start, step)
         if found is None:
             return None
         k, index = found
         axis = np.array([np.cos(orientation[k]), np.sin(orientation[k])])
         centre, velocity = self._motion(index, start + k)
         ego = np.zeros(2)
-        if len(x) > 1:
+        if len(here) > 1:
             i = max(k - 1, 0)
-            ego = np.array([x[i + 1] - x[i], y[i + 1] - y[i]]) * self.substeps / self.dt
-        behind = (centre - (x[k], y[k])) @ axis < -0.5 * self._half[0] and (velocity - ego) @ axis > 0.0
+            moved = here[i + 1] - here[i]
+            ego = np.array([moved.real, moved.imag]) * self.substeps / self.dt
+        offset = centre - (here[k].real, here[k].imag)
+        behind = offset @ axis < -0.5 * self._half[0] and (velocity - ego) @ axis > 0.0
         return Contact((start + k) * self.dt / self.substeps, self._obstacles[index].id, bool(behind))
 
     def _motion(self, index: int, sample: int) -> tuple[Array, Array]:
@@ -230,53 +241,56 @@ class CollisionWorld:
             velocity = speed * np.array([np.cos(heading), np.sin(heading)])
         return centre, velocity
 
-    def _first(self, x: Array, y: Array, orientation: Array, start: int) -> tuple[int, int] | None:
+    def _first(
+        self, here: Points, orientation: Array, start: int, step: float | None = None
+    ) -> tuple[int, int] | None:
         """Sample (counted from ``start``) and obstacle index of the first collision."""
-        stop = start + len(x)
+        stop = start + len(here)
         if start < 0 or stop > self.n_samples:
             raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
-        here = _complex(x, y)
-        # A sum is cheaper than a look at each, and finite only if they are.
-        if not cmath.isfinite(np.add.reduce(here) + np.add.reduce(orientation)) and not (
+        # A sum of squares is cheaper than a look at each, and finite only if they are.
+        parts = here.view(np.float64)
+        if not math.isfinite(parts.dot(parts) + orientation.dot(orientation)) and not (
             np.isfinite(here).all() and np.isfinite(orientation).all()
         ):
             raise ValueError("the ego's poses are not finite")
-        k, m = self._near(here, start)
-        if not len(k):
+        if step is None:
+            step = float(np.abs(here[1:] - here[:-1]).max(initial=0.0))
+        ego, row = self._near(here, start, step)
+        if not len(ego):
             return None
-        ego, row = k - start, k * len(self._kind) + m
-        turned = orientation.take(ego)
-        axis = _complex(np.cos(turned), -np.sin(turned))
-        seen, size = (self._centre.take(row) - here.take(ego)) * axis, self._size.take(row, axis=0)
-        hit = _rectangles_touch(seen, self._axis.take(row) * axis, self._half, size)
-        if self._round:
-            beyond = np.hypot(
-                np.maximum(np.abs(seen.real) - self._half[0], 0.0),
-                np.maximum(np.abs(seen.imag) - self._half[1], 0.0),
-            )
-            hit = np.where(self._kind[m] == _RECTANGLE, hit, beyond <= size[:, 0] + _TOUCH)
-        if not hit.any():
+        axis = np.exp(orientation.take(ego) * _CLOCKWISE)
+        shapes = self._shapes.take(row, axis=1)
+        shapes[0] -= here.take(ego)
+        shapes *= axis
+        size, around = self._size.take(row, axis=0), shapes[0].copy() if self._round else None
+        hit = _rectangles_touch(shapes, self._axis.take(row) * axis, self._half, size)
+        if around is not None:
+            beyond = np.maximum(np.abs(around.view(np.float64).reshape(-1, 2)) - self._half, 0.0)
+            round_hit = np.hypot(beyond[:, 0], beyond[:, 1]) <= size[:, 0] + _TOUCH
+            hit = np.where(self._kind[row % len(self._kind)] == _RECTANGLE, hit, round_hit)
+        if not np.count_nonzero(hit):
             return None
         hits = np.flatnonzero(hit)
-        for i in hits[np.lexsort((m[hits], k[hits]))].tolist():
-            pose = (x[ego[i]], y[ego[i]], axis[i].real, -axis[i].imag)
-            if self._kind[m[i]] != _POLYGON or self._polygons_touch(int(k[i]), int(m[i]), pose):
-                return int(ego[i]), int(self._owner[m[i]])
+        for i in hits[row[hits].argsort()].tolist():
+            (k, m), at = divmod(int(row[i]), len(self._kind)), here[ego[i]]
+            pose = (at.real, at.imag, axis[i].real, -axis[i].imag)
+            if self._kind[m] != _POLYGON or self._polygons_touch(k, m, pose):
+                return k - start, int(self._owner[m])
         return None
 
-    def _near(self, here: Points, start: int) -> tuple[Index, Index]:
-        """Samples and tracks (n,), in no order, outside of which nothing touches: one look per block."""
+    def _near(self, here: Points, start: int, step: float) -> tuple[Index, Index]:
+        """The ego's samples, and the shapes' rows there (n,), outside of which nothing touches; in no order.
+
+        One look per block: within it no sample is farther than half a block from the one in its middle.
+        """
         size, stop = self._block, start + len(here)
         blocks = slice(start // size, -(-stop // size))
-        # Within a block no sample is farther than half a block from the one that is looked at.
-        step = float(np.maximum.reduce(np.abs(here[1:] - here[:-1]), initial=0.0))
-        offset = self._block_centre[blocks] - here.take(_looked_at(start, stop, size))
-        near = np.abs(offset) <= self._block_reach[blocks] + size // 2 * step
-        block, track = near.nonzero()
-        if not len(block):
-            return block, track
-        samples = self._block_samples[blocks.start + block].ravel()
-        return np.minimum(np.maximum(samples, start), stop - 1), track.repeat(size)
+        middle, samples, rows = _block_samples(start, stop, size, len(self._kind))
+        away = np.abs(self._block_centre[blocks] - here.take(middle))
+        away -= size // 2 * step
+        block, track = (away <= self._block_reach[blocks]).nonzero()
+        return samples.take(block, axis=0).ravel(), (rows.take(block, axis=0) + track[:, None]).ravel()
 
     def _polygons_touch(self, k: int, m: int, pose: tuple[float, float, float, float]) -> bool:
         """Whether the ego at ``x, y, cos, sin`` meets a polygon of a track at a sample."""
@@ -310,12 +324,18 @@ def _rows(obstacle: Obstacle) -> tuple[int, Array]:
 
 
 @lru_cache(maxsize=256)
-def _looked_at(start: int, stop: int, size: int) -> Index:
-    """Of each block of ``size`` samples that meets [start, stop), its middle, (n, 1) from ``start`` on."""
-    middle = np.arange(start // size, -(-stop // size)) * size + size // 2
-    looked_at = np.clip(middle - start, 0, max(stop - start - 1, 0))[:, None]
-    looked_at.setflags(write=False)
-    return looked_at
+def _block_samples(start: int, stop: int, size: int, tracks: int) -> tuple[Index, Index, Index]:
+    """Of each block of ``size`` samples that meets [start, stop): its middle (n, 1), its samples (n, size).
+
+    Counted from ``start`` on; the first and the last of [start, stop) stand for those outside. Also where
+    the samples' rows of ``tracks`` shapes each begin.
+    """
+    samples = np.arange(start // size * size, -(-stop // size) * size).reshape(-1, size) - start
+    samples = np.minimum(np.maximum(samples, 0), max(stop - start - 1, 0))
+    made = samples[:, size // 2, None].copy(), samples, (samples + start) * tracks
+    for indices in made:
+        indices.setflags(write=False)
+    return made
 
 
 def _complex(x: Array, y: Array) -> Points:
@@ -326,27 +346,38 @@ def _complex(x: Array, y: Array) -> Points:
     return made
 
 
-def _parts(points: Points) -> Array:
-    """Real and imaginary part, without their signs, (n, 2)."""
-    parts: Array = np.abs(points.view(np.float64).reshape(-1, 2))
-    return parts
-
-
-def _rectangles_touch(offset: Points, turn: Points, half: Array, size: Array) -> npt.NDArray[np.bool_]:
+def _rectangles_touch(shapes: Points, turn: Points, half: Array, size: Array) -> npt.NDArray[np.bool_]:
     """Whether the ego and rectangles meet: separating axes.
 
-    ``offset`` and ``turn`` (n,) give the other rectangle's centre and direction seen from the ego,
-    ``size`` (n, 2) its half length and width.
+    Parameters
+    ----------
+    shapes : (3, n) complex array
+        Centres of the rectangles, and half diagonals of either direction, seen from the ego; overwritten.
+    turn : (n,) complex array
+        Their directions, seen from the ego.
+    half : (2,) array
+        Half length and width of the ego.
+    size : (n, 2) array
+        Half length and width of the rectangles.
     """
-    along = _parts(turn)
-    across = along[:, ::-1]
-    meets = _parts(offset) <= size[:, :1] * along + size[:, 1:] * across + (half + _TOUCH)
-    hit = meets[:, 0] & meets[:, 1]
-    if hit.any():  # mostly one of the ego's own axes tells the two apart
-        meets = _parts(offset * turn.conj()) <= half[0] * along + half[1] * across + (size + _TOUCH)
-        hit &= meets[:, 0]
-        hit &= meets[:, 1]
+    hit = _reached(shapes, half)
+    if np.count_nonzero(hit):  # mostly one of the ego's own axes tells the two apart
+        shapes[1] = diagonal = complex(*half)
+        shapes[2] = diagonal.conjugate()
+        shapes *= turn.conj()
+        hit &= _reached(shapes, size)
     return hit
+
+
+def _reached(shapes: Points, half: Array) -> npt.NDArray[np.bool_]:
+    """Whether rectangles (3, n), as in :func:`_rectangles_touch`, meet one that lies along the axes.
+
+    Asked are these axes only; ``half`` (2,) or (n, 2) are that one's half sizes.
+    """
+    offset, one, other = np.abs(shapes.view(np.float64).reshape(3, -1, 2))
+    meets = offset <= np.maximum(one, other) + (half + _TOUCH)
+    reached: npt.NDArray[np.bool_] = meets[:, 0] & meets[:, 1]
+    return reached
 
 
 def _polygon_touches(polygon: Array, pose: tuple[float, float, float, float], half: Array) -> bool:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ import numpy.typing as npt
 from repair.types import Array
 
 if TYPE_CHECKING:
+    from repair.scene.frame import CartesianPath
     from repair.scene.vehicle import Vehicle
 
 __all__ = [
@@ -184,26 +185,30 @@ def drive(
         Where ``distance`` does not grow, orientation and steering are held: a vehicle at rest does
         not turn, whatever the path's heading does there.
     """
-    slip, orientation = body_angles(heading, speed, distance, vehicle, slip0)
+    step, turn = distance[1:] - distance[:-1], heading[1:] - heading[:-1]
+    slowest = float(np.minimum.reduce(speed, initial=np.inf))
+    slip, orientation = _angles(heading, speed, step, turn, slowest, vehicle.rear, slip0)
     return driven_states(t, xy, speed, slip, orientation, vehicle)
 
 
-def body_angles(
-    heading: Array, speed: Array, distance: Array, vehicle: Vehicle, slip0: float | None = None
+def body_angles(path: CartesianPath, vehicle: Vehicle, slip0: float | None = None) -> tuple[Array, Array]:
+    """Slip angle and orientation (K,) [rad] along a path; ``slip0`` and rules as in :func:`drive`."""
+    return _angles(path.heading, path.speed, path.step, path.turn, path.slowest, vehicle.rear, slip0)
+
+
+def _angles(
+    heading: Array, speed: Array, step: Array, turn: Array, slowest: float, rear: float, slip0: float | None
 ) -> tuple[Array, Array]:
-    """Slip angle and orientation (K,) [rad] along a path; arguments and rules as in :func:`drive`."""
-    step = distance[1:] - distance[:-1]
-    turn = heading[1:] - heading[:-1]
-    if np.minimum.reduce(step, initial=np.inf) > _MOVES:
-        if not np.minimum.reduce(speed) > 0.0:
+    if len(step) and np.minimum.reduce(step) > _MOVES:
+        if not slowest > 0.0:
             step = np.copysign(step, speed[1:] + speed[:-1])
-        slip = _slip_angle(turn, step, step, vehicle.rear, slip0)
+        slip = _slip_angle(turn, step, step, rear, slip0)
         return slip, heading - slip
     moving = step > _MOVES
     step = np.where(moving, np.copysign(step, speed[1:] + speed[:-1]), 0.0)
     turn = np.where(moving, turn, 0.0)
     # Where nothing moves, nothing turns: a length of 1 there only avoids the division by zero.
-    slip = _slip_angle(turn, step, np.where(moving, step, 1.0), vehicle.rear, slip0)
+    slip = _slip_angle(turn, step, np.where(moving, step, 1.0), rear, slip0)
     return slip, heading[0] + np.concatenate(([0.0], np.cumsum(turn))) - slip
 
 
@@ -317,17 +322,14 @@ def clearly_drivable(
         Speed of the centre [m/s], slip angle and orientation [rad]; see :func:`driven_states`.
     """
     _, steering, top, acceleration, friction, position, angle = _ACCEPT_LIST
-    rows = np.empty((4, len(slip)))
-    v, tangent, turning, psi = rows
+    rows = np.zeros((5, len(slip)))
+    v, tangent, turning = rows[:3]
     np.tan(slip, out=tangent)  # that of the steering angle times rear / wheelbase
     np.multiply(speed, np.cos(slip), out=v)
     np.multiply(v, tangent, out=turning)  # rate of the orientation times rear
-    psi[:] = orientation
-    change = rows[:, 1:] - rows[:, :-1]
+    np.subtract(rows[:2, 1:], rows[:2, :-1], out=rows[3:, 1:])
     low, high = np.minimum.reduce(rows, axis=1).tolist(), np.maximum.reduce(rows, axis=1).tolist()
-    fall, rise = np.minimum.reduce(change, axis=1).tolist(), np.maximum.reduce(change, axis=1).tolist()
-    fastest, steepest, turn = [max(-a, b) for a, b in zip(low[:3], high[:3], strict=True)]
-    dv, dtangent, dturning, dpsi = [max(-a, b) for a, b in zip(fall, rise, strict=True)]
+    largest = fastest, steepest, turn, dv, dtangent = [max(-a, b) for a, b in zip(low, high, strict=True)]
     engine = acceleration * vehicle.a_max
     if fastest > vehicle.v_switch:
         engine = _ENGINE * vehicle.a_max * vehicle.v_switch / fastest
@@ -335,52 +337,54 @@ def clearly_drivable(
     if not (
         steepest * to_steering <= math.tan(_SURE * steering * vehicle.steering_max)
         and dtangent * to_steering <= _SURE * dt * _STEERING_RATE * vehicle.steering_rate_max  # no cut
-        and high[0] + max(rise[0], 0.0) <= _SURE * top * vehicle.v_max
-        and low[0] + min(fall[0], 0.0) >= _SURE * top * vehicle.v_min
-        and rise[0] <= _SURE * engine * dt
-        and -fall[0] <= _SURE * acceleration * vehicle.a_max * dt
+        and high[0] + high[3] <= _SURE * top * vehicle.v_max
+        and low[0] + low[3] >= _SURE * top * vehicle.v_min
+        and high[3] <= _SURE * engine * dt
+        and -low[3] <= _SURE * acceleration * vehicle.a_max * dt
         and math.hypot(dv / dt, fastest * turn / vehicle.rear) <= _SURE * friction * vehicle.a_max
     ):
         return False
-    centre = np.ascontiguousarray(xy).view(np.complex128)[:, 0]
-    largest = (fastest, steepest, dv, dtangent, dturning, dpsi)
-    shift, turned = _error_bounds(centre, v, turning, psi, largest, dt, vehicle)
+    shift, turned = _error_bounds(xy, rows[:3], orientation, largest, dt, vehicle)
     return (
         turned <= _SURE * angle * ORIENTATION_TOLERANCE
         and shift <= _SURE * position * POSITION_TOLERANCE
-        and float(np.maximum.reduce(np.abs(centre.view(np.float64)))) <= _FAR
+        and float(np.maximum.reduce(np.abs(xy), axis=None)) <= _FAR
     )
 
 
 def _error_bounds(
-    centre: npt.NDArray[np.complexfloating[Any, Any]],
-    v: Array,
-    turning: Array,
-    psi: Array,
-    largest: tuple[float, float, float, float, float, float],
-    dt: float,
-    vehicle: Vehicle,
+    xy: Array, rows: Array, psi: Array, largest: Sequence[float], dt: float, vehicle: Vehicle
 ) -> tuple[float, float]:
     """Bounds of what :func:`_errors` gives: of the position and of the orientation.
 
     The trapezoidal rule stands in for Simpson's. What the two differ by, at most, is added: each term
     is half a step's second difference of a factor, a product of two changes, or follows from these.
-    ``largest`` holds the speed, the tangent of the slip angle and the changes of ``v``, of that tangent,
-    of ``turning`` (the product of the two) and of ``psi``, which are largest in size.
+    ``rows`` (3, T) holds the speed, the tangent of the slip angle and the product of both, ``largest``
+    what is largest in size of these and of the changes of the first two.
     """
-    fastest, steepest, dv, dtangent, dturning, dpsi = largest
+    fastest, steepest, turn, dv, dtangent = largest
     rear, to_steering = vehicle.rear, vehicle.wheelbase / vehicle.rear
+    # The pose (orientation times rear, rear axle), and half of how far its rates move it within a step.
+    pose, moved = np.empty((2, 3, len(psi)))
+    pose[0] = psi
+    np.cos(psi, out=moved[1])
+    np.sin(psi, out=moved[2])
+    pose[1:] = moved[1:]
+    pose *= rear
+    np.subtract(xy.T, pose[1:], out=pose[1:])
+    moved[0] = rows[1]
+    moved *= (0.5 * dt) * rows[0]
+    missed = np.abs((pose - moved)[:, 1:] - (pose + moved)[:, :-1])
+    off, *shift = np.maximum.reduce(missed, axis=1).tolist()
     steep, dsteep = steepest * to_steering, dtangent * to_steering
     # between two steering angles, the tangent in the middle and the mean of the tangents
     bow = 0.25 * dsteep * dsteep * steep * (1.0 + steep * steep) / to_steering
-    off = np.abs(psi[1:] - psi[:-1] - (0.5 * dt / rear) * (turning[1:] + turning[:-1]))
-    turned = float(np.maximum.reduce(off)) + dt / rear * (dv * dtangent / 6.0 + fastest * bow / 1.5)
-    direction = np.exp(1j * psi)
-    axle, way = centre - rear * direction, (0.5 * dt) * v * direction
-    missed = np.abs((axle[1:] - axle[:-1] - way[1:] - way[:-1]).view(np.float64))
+    turned = (off + dt * (dv * dtangent / 6.0 + fastest * bow / 1.5)) / rear
+    # the changes of the turning rate and of the orientation follow from those of the others
+    dturning, dpsi = fastest * dtangent + steepest * dv, (dt * turn + off) / rear
     # directions at the end and in the middle of a step: those simulated and those used here
     spread = 0.5 * turned + dt * dturning / (12.0 * rear) + dpsi * dpsi / 12.0
-    return float(np.maximum.reduce(missed)) + dt * (dv * dpsi / 6.0 + fastest * spread), turned
+    return max(shift) + dt * (dv * dpsi / 6.0 + fastest * spread), turned
 
 
 def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:

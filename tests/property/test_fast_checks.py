@@ -167,10 +167,11 @@ def test_looking_at_blocks_drops_no_contact(seed):
     world = CollisionWorld(crowd(rng), EGO, 0.1, 20, substeps, shifts)
     start = int(rng.integers(0, world.n_samples))
     x, y, heading = driven(rng, int(rng.integers(1, world.n_samples - start + 1)))
-    found = world._first(x, y, heading, start)
+    here = x + 1j * y
+    found = world._first(here, heading, start)
     k, m = np.indices((len(x), len(world._kind))).reshape(2, -1)
-    world._near = lambda here, start: (k + start, m)
-    assert world._first(x, y, heading, start) == found
+    world._near = lambda here, start, step: (k, (k + start) * len(world._kind) + m)
+    assert world._first(here, heading, start) == found
 
 
 # --------------------------------------------------------------------- limits
@@ -183,7 +184,7 @@ def test_what_is_well_within_the_limits_breaks_none(seed):
     n = int(rng.integers(1, 40))
     speed = rng.uniform(-1, 12) + np.cumsum(rng.normal(0, rng.choice([0.0, 0.01, 0.1]), n))
     heading = np.cumsum(rng.normal(0, rng.choice([0.0, 0.001, 0.01]), n))
-    path = CartesianPath(0.025 * np.arange(n), np.zeros((n, 2)), heading, speed, np.zeros(n))
+    path = CartesianPath.through(0.025 * np.arange(n), np.zeros(n) * 1j, heading, speed, speed.min())
     late = int(rng.integers(0, n))
     reached = peaks(path, slice(late, None))
     share = rng.uniform(0.95, 1.3, 5)  # the limits are near to what is reached
@@ -203,7 +204,7 @@ def test_what_is_well_within_the_limits_breaks_none(seed):
 
 def test_gentle_driving_is_well_within_the_limits():
     t = 0.025 * np.arange(80)
-    path = CartesianPath(t, np.zeros((80, 2)), 0.05 * t, 10.0 - t, 10.0 * t)
+    path = CartesianPath.through(t, np.zeros(80) * 1j, 0.05 * t, 10.0 - t, 7.0)
     checker = Checker.__new__(Checker)
     checker.limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
     assert checker._well_within_limits(path, 0)
@@ -225,8 +226,8 @@ def ride(rng, vehicle, dt):
     heading = np.cumsum(curvature * step)
     xy = np.cumsum(np.column_stack((np.cos(heading), np.sin(heading))) * step[:, None], axis=0)
     xy += rng.choice([0.0, 0.0, 0.0, 4990.0, 1e6]) + rng.normal(0, rng.choice([0.0, 0.0, 0.003]), (n, 2))
-    distance = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))))
-    slip, orientation = body_angles(heading, speed, distance, vehicle)
+    path = CartesianPath.through(dt * np.arange(n), xy.view(np.complex128)[:, 0], heading, speed, speed.min())
+    slip, orientation = body_angles(path, vehicle)
     return xy, speed, slip, orientation
 
 

@@ -55,7 +55,9 @@ def test_rectangles_as_in_pycrcc():
     other = np.column_stack((rng.uniform(-5, 5, (n, 2)), rng.uniform(-4, 4, n), rng.uniform(0.1, 4, (n, 2))))
     offset = (other[:, :2] - ego[:, :2]) @ [1.0, 1j] * np.exp(-1j * ego[:, 2])
     turn = np.exp(1j * (other[:, 2] - ego[:, 2]))
-    ours = _rectangles_touch(offset, turn, np.array(HALF), other[:, 3:])
+    diagonal = other[:, 3:] @ [1.0, 1j]
+    shapes = np.array((offset, turn * diagonal, turn * diagonal.conj()))
+    ours = _rectangles_touch(shapes, turn, np.array(HALF), other[:, 3:])
     theirs = [
         RectOBB(*HALF, e[2], e[0], e[1]).collide(RectOBB(o[3], o[4], o[2], o[0], o[1]))
         for e, o in zip(ego, other, strict=True)

@@ -6,9 +6,8 @@ polyline is smoothed first, and position, heading and curvature then come from o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,8 @@ from repair.types import Array, FrenetTrajectory, frozen
 
 __all__ = ["STANDSTILL", "CartesianPath", "FrenetFrame"]
 
+Points = npt.NDArray[np.complexfloating[Any, Any]]
+
 STANDSTILL = 1e-2
 """Below this speed [m/s] the direction of motion is noise: a trajectory's heading is held."""
 
@@ -25,10 +26,11 @@ _STEP = 0.25  # knot distance of the table [m]
 _MIN_LENGTH = 1.0  # a shorter path has no meaningful direction [m]
 _DOMAIN = 0.05  # smallest 1 - kappa l at which a projection still counts as unique
 _NEWTON = 8
+# As arrays, because NumPy takes longer to convert a plain number than to multiply a row by it.
+_ZERO, _ONE = np.array(0.0), np.array(1.0)
 
 
-@dataclass(frozen=True)
-class CartesianPath:
+class CartesianPath(NamedTuple):
     """A trajectory in the plane.
 
     Attributes
@@ -42,15 +44,49 @@ class CartesianPath:
         while reversing.
     speed : (K,) array
         Signed speed [m/s], negative while reversing.
-    distance : (K,) array
-        Distance driven since the first sample [m].
+    step : (K - 1,) array
+        Distance from each sample to the next [m].
+    turn : (K - 1,) array
+        Change of heading from each sample to the next [rad].
+    slowest, longest, sharpest : float
+        Smallest speed, largest step and largest size of a turn: what several checks ask for first. NaN
+        where one of the values is.
     """
 
     t: Array
     xy: Array
     heading: Array
     speed: Array
-    distance: Array
+    step: Array
+    turn: Array
+    slowest: float
+    longest: float
+    sharpest: float
+
+    @classmethod
+    def through(cls, t: Array, plane: Points, heading: Array, speed: Array, slowest: float) -> CartesianPath:
+        """The path through points x + iy (K,), K > 0, of which heading, speed and smallest speed are known.
+
+        Jumps of the heading by full turns are taken out.
+        """
+        step = np.abs(plane[1:] - plane[:-1])
+        turn = heading[1:] - heading[:-1]
+        longest = sharpest = 0.0
+        if len(step):
+            longest, sharpest = float(np.maximum.reduce(step)), float(np.maximum.reduce(np.abs(turn)))
+            if not sharpest < np.pi:
+                heading = np.unwrap(heading)
+                turn = heading[1:] - heading[:-1]
+                sharpest = float(np.maximum.reduce(np.abs(turn)))
+        xy = plane.view(np.float64).reshape(-1, 2)
+        return cls(t, xy, heading, speed, step, turn, slowest, longest, sharpest)
+
+    @property
+    def distance(self) -> Array:
+        """Distance driven since the first sample (K,) [m]."""
+        distance = np.zeros(len(self.t))
+        np.add.accumulate(self.step, out=distance[1:])
+        return distance
 
 
 class FrenetFrame:
@@ -81,7 +117,7 @@ class FrenetFrame:
         self.length = float(length)
         self.max_lateral = float(max_lateral)
         self.s = frozen(np.linspace(0.0, length, count + 1))
-        self._inverse = count / self.length
+        self._inverse = np.array(count / self.length)
         # "natural": the curvature ends at 0, so the straight extensions join with C2
         spline = CubicSpline(self.s, points, bc_type="natural")
         cubic = spline.c  # (4, count, 2), highest power first
@@ -90,9 +126,10 @@ class FrenetFrame:
         ends[3, 1], ends[2, 1] = points[-1], spline(self.length, 1)
         # one straight segment before the first and one after the last: no branches when evaluating
         full = np.concatenate([ends[:, :1], cubic, ends[:, 1:]], axis=1)
-        self._coefficients = frozen(full.transpose(0, 2, 1))  # (4, 2, count + 2): long rows evaluate fast
-        self._knots = frozen(np.concatenate([[0.0], self.s]))
-        self._last = float(count + 1)
+        # (9, count + 2): where the segments begin and their coefficients; long rows evaluate fast
+        starts = np.concatenate([[0.0], self.s])
+        self._segments = frozen(np.vstack([starts, full.transpose(0, 2, 1).reshape(8, -1)]))
+        self._last = np.array(count + 1.0)
         velocity, second = spline(self.s, 1), spline(self.s, 2)
         heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
         self.points = frozen(points)
@@ -136,18 +173,19 @@ class FrenetFrame:
 
     # ------------------------------------------------------------------ evaluation
 
-    def _locate(self, s: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array]:
+    def _locate(self, s: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array, Array]:
+        """Segment of each ``s`` (...), the way into it (...), its coefficients (4, 2, ...)."""
         query = np.asarray(s, dtype=np.float64)
         # fmax/fmin send NaN to segment 0; the offset stays NaN and so does the result
         # and what is not negative is rounded down by the cast
-        where = query * self._inverse + 1.0
-        index = np.fmin(np.fmax(where, 0.0), self._last).astype(np.intp)
-        return index, query - self._knots.take(index)
+        where = query * self._inverse + _ONE
+        index = np.fmin(np.fmax(where, _ZERO), self._last).astype(np.intp)
+        segments = self._segments.take(index, axis=1)
+        return index, query - segments[0], segments[1:].reshape(4, 2, *query.shape)
 
-    def _derivatives(self, s: npt.ArrayLike, highest: int) -> tuple[list[Array], Any]:
-        """Position and derivatives by s up to ``highest``, each (2, ...), and the segment."""
-        index, u = self._locate(s)
-        c3, c2, c1, c0 = self._coefficients.take(index, axis=2)
+    def _derivatives(self, s: npt.ArrayLike, highest: int) -> list[Array]:
+        """Position and derivatives by s up to ``highest``, each (2, ...)."""
+        _, u, (c3, c2, c1, c0) = self._locate(s)
         found = [((c3 * u + c2) * u + c1) * u + c0]
         if highest >= 1:
             found.append((3.0 * c3 * u + 2.0 * c2) * u + c1)
@@ -155,16 +193,15 @@ class FrenetFrame:
             found.append(6.0 * c3 * u + 2.0 * c2)
         if highest >= 3:
             found.append(6.0 * c3)
-        return found, index
+        return found
 
     def position(self, s: npt.ArrayLike) -> Array:
         """Points of the path (..., 2) at ``s`` (...)."""
-        return _pairs(*self._derivatives(s, 0)[0][0])
+        return _pairs(*self._derivatives(s, 0)[0])
 
     def heading(self, s: npt.ArrayLike) -> Array:
         """Continuous heading [rad] at ``s``."""
-        index, u = self._locate(s)
-        c3, c2, c1, _ = self._coefficients.take(index, axis=2)
+        index, u, (c3, c2, c1, _) = self._locate(s)
         x1, y1 = (3.0 * c3 * u + 2.0 * c2) * u + c1
         return self._continuous(np.arctan2(y1, x1), index)
 
@@ -181,20 +218,20 @@ class FrenetFrame:
 
     def curvature(self, s: npt.ArrayLike) -> Array:
         """Curvature [1/m] at ``s``, left positive."""
-        (_, (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
+        _, (x1, y1), (x2, y2) = self._derivatives(s, 2)
         square = x1 * x1 + y1 * y1
         return np.asarray((x1 * y2 - y1 * x2) / (square * np.sqrt(square)))
 
     def curvature_rate(self, s: npt.ArrayLike) -> Array:
         """Derivative of the curvature by s [1/m²] (piecewise continuous)."""
-        (_, (x1, y1), (x2, y2), (x3, y3)), _ = self._derivatives(s, 3)
+        _, (x1, y1), (x2, y2), (x3, y3) = self._derivatives(s, 3)
         square = x1 * x1 + y1 * y1
         cross, rate, dot = x1 * y2 - y1 * x2, x1 * y3 - y1 * x3, x1 * x2 + y1 * y2
         return np.asarray((rate - 3.0 * cross * dot / square) / (square * np.sqrt(square)))
 
     def to_cartesian(self, s: npt.ArrayLike, l: npt.ArrayLike) -> Array:  # noqa: E741
         """Points (..., 2) at arc length ``s`` and offset ``l``."""
-        ((x, y), (x1, y1)), _ = self._derivatives(s, 1)
+        (x, y), (x1, y1) = self._derivatives(s, 1)
         offset = np.asarray(l, dtype=np.float64) / np.sqrt(x1 * x1 + y1 * y1)
         return _pairs(x - offset * y1, y + offset * x1)
 
@@ -252,14 +289,14 @@ class FrenetFrame:
         px, py = np.ascontiguousarray(flat.T)
         s = start
         for _ in range(_NEWTON):
-            ((x, y), (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
+            (x, y), (x1, y1), (x2, y2) = self._derivatives(s, 2)
             gx, gy = px - x, py - y
             slope = gx * x2 + gy * y2 - x1 * x1 - y1 * y1  # -(1 - kappa l)
             step = (gx * x1 + gy * y1) / np.minimum(slope, -_DOMAIN)
             s = s - step
             if np.max(np.abs(step)) < 1e-11:
                 break
-        ((x, y), (x1, y1), (x2, y2)), _ = self._derivatives(s, 2)
+        (x, y), (x1, y1), (x2, y2) = self._derivatives(s, 2)
         gx, gy = px - x, py - y
         square = x1 * x1 + y1 * y1
         norm = np.sqrt(square)
@@ -277,41 +314,62 @@ class FrenetFrame:
 
     def cartesian(self, trajectory: FrenetTrajectory) -> CartesianPath:
         """Carry a Frenet trajectory into the plane; see :class:`CartesianPath`."""
-        return self.carry(trajectory.t, trajectory.position, trajectory.velocity)
+        motion = np.empty((4, len(trajectory)))
+        motion[:2], motion[2:] = trajectory.position.T, trajectory.velocity.T
+        return self.carry(trajectory.t, motion)
 
-    def carry(self, t: Array, position: Array, velocity: Array) -> CartesianPath:
-        """As :meth:`cartesian`, of the only columns (K, 2) that it needs.
+    def carry(self, t: Array, motion: Array) -> CartesianPath:
+        """As :meth:`cartesian`, of the only rows (4, K) that it needs: s, l and their rates.
 
         Every repair that is tried comes through here: calls into NumPy are what it costs.
         """
-        s, s_rate, sideways = position[:, 0], velocity[:, 0], velocity[:, 1]
-        index, u = self._locate(s)
-        c3, c2, c1, c0 = self._coefficients.take(index, axis=2)
+        s, l, s_rate, l_rate = motion  # noqa: E741
+        index, way, (c3, c2, c1, c0) = self._locate(s)
+        u = np.empty((2, len(s)))  # rows of the same length need no broadcasting
+        u[:] = way
+        # Horner's scheme, which gives the derivatives as well
         c3u = c3 * u
-        axis = ((c3u + c2) * u + c1) * u + c0
-        second = 3.0 * c3u + c2  # half of it
-        tangent = (second + c2) * u + c1
-        x1, y1 = tangent[0], tangent[1]
-        square = x1 * x1 + y1 * y1
-        offset = position[:, 1] / np.sqrt(square)
-        plane, motion = np.empty((2, len(s)), dtype=np.complex128)
-        np.subtract(axis[0], offset * y1, out=plane.real)
-        np.add(axis[1], offset * x1, out=plane.imag)
-        bend = (x1 * second[1] - y1 * second[0]) / square  # half of the curvature times the tangent's length
-        forward = s_rate * (1.0 - 2.0 * bend * offset)
-        motion.real, motion.imag = forward, sideways
-        speed = np.abs(motion)
-        base = self._continuous(np.arctan2(y1, x1), index)
-        if s_rate.size and np.minimum.reduce(s_rate) >= 0.0:
-            heading = _held(base + np.arctan2(sideways, forward), base, speed)
-        else:
+        quadratic = c3u + c2
+        linear = quadratic * u + c1
+        quadratic += c3u
+        tangent = quadratic * u + linear
+        plane = np.empty(len(s), dtype=np.complex128)
+        np.add(linear * u, c0, out=plane.view(np.float64).reshape(-1, 2).T)
+        heading = base = self._continuous(np.arctan2(tangent[1], tangent[0]), index)
+        slowest = float(np.minimum.reduce(s_rate)) if len(s) else np.inf
+        forward, sideways, sign = s_rate, l_rate, None
+        if not slowest >= 0.0:
             sign = np.where(s_rate < 0.0, -1.0, 1.0)
-            slip = np.arctan2(sign * sideways, sign * forward)
-            heading = _held(base + slip, base, speed)
-            speed *= sign
-        distance = np.zeros(len(s))
-        np.add.accumulate(np.abs(plane[1:] - plane[:-1]), out=distance[1:])
-        return CartesianPath(t, plane.view(np.float64).reshape(-1, 2), heading, speed, distance)
+            forward, sideways = sign * s_rate, sign * l_rate
+        speed = forward
+        if np.count_nonzero(l) or np.count_nonzero(l_rate):
+            quadratic += c3u  # half of the second derivative
+            forward = forward * _aside(plane, tangent, quadratic, l)
+            motion_here = np.empty_like(plane)
+            motion_here.real, motion_here.imag = forward, sideways
+            speed = np.abs(motion_here)
+            heading = base + np.arctan2(sideways, forward)
+            slowest = float(np.minimum.reduce(speed)) if len(s) else np.inf
+        if not slowest >= STANDSTILL:
+            heading = _held(heading, base, np.abs(speed))
+        if sign is not None:
+            speed = speed * sign
+            slowest = float(np.minimum.reduce(speed)) if len(s) else np.inf
+        return CartesianPath.through(t, plane, heading, speed, slowest)
+
+
+def _aside(plane: Points, tangent: Array, second: Array, l: Array) -> Array:  # noqa: E741
+    """Move points of the path aside by ``l`` (K,); how much longer their way is than that along the path.
+
+    ``tangent`` and ``second`` (2, K) are the first derivative and half of the second.
+    """
+    x1, y1 = tangent
+    square = x1 * x1 + y1 * y1
+    offset = l / np.sqrt(square)
+    plane.real -= offset * y1
+    plane.imag += offset * x1
+    bend = (x1 * second[1] - y1 * second[0]) / square  # half of the curvature times the tangent's length
+    return np.asarray(1.0 - 2.0 * bend * offset)
 
 
 def _pairs(x: Array, y: Array) -> Array:
@@ -324,21 +382,11 @@ def _pairs(x: Array, y: Array) -> Array:
 
 def _held(heading: Array, fallback: Array, pace: Array) -> Array:
     """Headings with those of standing samples taken from the last (else the first) moving one."""
-    if np.minimum.reduce(pace, initial=np.inf) >= STANDSTILL:
-        return _unwrapped(heading)
     moving = pace >= STANDSTILL
     if not moving.any():
         return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
-    return _unwrapped(heading[np.where(last < 0, int(np.argmax(moving)), last)])
-
-
-def _unwrapped(angle: Array) -> Array:
-    """:func:`numpy.unwrap`, which is slow, only where there is something to unwrap."""
-    jump = angle[1:] - angle[:-1]
-    if jump.size and not np.maximum.reduce(np.abs(jump)) < np.pi:
-        return np.asarray(np.unwrap(angle))
-    return angle
+    return np.asarray(heading[np.where(last < 0, int(np.argmax(moving)), last)])
 
 
 def _clean(points: npt.ArrayLike) -> Array:
