@@ -230,7 +230,7 @@ class Checker:
         if self.road is None or self._corridor is None:
             return None
         held = self._corridor.holds(s, centre, orientation)
-        if held.all():
+        if np.count_nonzero(held) == len(held):
             return None
         unsure = np.flatnonzero(~held)
         left = centre[unsure]
@@ -264,9 +264,14 @@ class Checker:
         inner = dense.t[skip::n]
         if len(t) != len(inner) or max(abs(t[0] - inner[0]), abs(t[-1] - inner[-1])) > 1e-9:
             return True
-        position = np.ascontiguousarray(dense.position[skip::n])
-        inside = (occupancy.lower[:, rows] < position) & (position < occupancy.upper[:, rows])
-        return bool((inside[..., 0] & inside[..., 1]).any())
+        lower, upper = occupancy.lower[:, rows], occupancy.upper[:, rows]
+        s, l = dense.position[skip::n].T  # noqa: E741
+        inside = (lower[..., 0] < s) & (s < upper[..., 0])
+        if not np.count_nonzero(inside):
+            return False
+        inside &= lower[..., 1] < l
+        inside &= l < upper[..., 1]
+        return bool(np.count_nonzero(inside))
 
     def _well_within_limits(self, path: CartesianPath, late: int) -> bool:
         """Whether bounds of the peaks, which cost less than the peaks, meet the limits already.

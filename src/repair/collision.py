@@ -31,7 +31,8 @@ Index = npt.NDArray[np.intp]
 _TOUCH = 1e-6
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
-_CLOCKWISE = np.array(-1j)  # an array, because NumPy takes long to convert a plain number
+# As arrays, because NumPy takes long to convert a plain number.
+_CLOCKWISE, _TOUCHING = np.array(-1j), np.array(complex(_TOUCH, _TOUCH))
 
 
 class Contact(NamedTuple):
@@ -102,6 +103,7 @@ class CollisionWorld:
         self.n_samples = n_steps * substeps + 1
         self._obstacles = tuple(obstacles)
         self._half = np.array((0.5 * vehicle.length, 0.5 * vehicle.width))
+        self._diagonal = np.array(complex(*self._half))  # an array for the reason that _CLOCKWISE is one
         sample = np.arange(self.n_samples)
         self._before = sample // substeps
         self._after = -(-sample // substeps)
@@ -149,7 +151,7 @@ class CollisionWorld:
         # (3, samples * tracks): centre, and from there to two corners
         diagonal = _complex(*size)
         self._shapes = np.stack((centre, axis * diagonal, axis * diagonal.conj())).reshape(3, -1)
-        self._axis, self._size = axis.ravel(), np.stack(size, axis=2).reshape(-1, 2)
+        self._axis, self._size = axis.ravel(), diagonal.ravel()
         radius = np.where(self._kind == _RECTANGLE, np.hypot(*size), size[0])
         self._round = bool((self._kind != _RECTANGLE).any())
         self._build_blocks(centre, radius + ego_radius)
@@ -210,7 +212,7 @@ class CollisionWorld:
     def contact_along(
         self, here: Points, orientation: Array, start: int = 0, step: float | None = None
     ) -> Contact | None:
-        """As :meth:`contact`, of centres x + iy (K,); ``step`` is how far two of them are apart at most [m]."""
+        """As :meth:`contact`, of centres x + iy (K,); ``step`` [m] is the longest between two, if known."""
         found = self._first(here, orientation, start, step)
         if found is None:
             return None
@@ -263,11 +265,11 @@ class CollisionWorld:
         shapes = self._shapes.take(row, axis=1)
         shapes[0] -= here.take(ego)
         shapes *= axis
-        size, around = self._size.take(row, axis=0), shapes[0].copy() if self._round else None
-        hit = _rectangles_touch(shapes, self._axis.take(row) * axis, self._half, size)
+        size, around = self._size.take(row), shapes[0].copy() if self._round else None
+        hit = _rectangles_touch(shapes, self._axis.take(row) * axis, self._diagonal, size)
         if around is not None:
             beyond = np.maximum(np.abs(around.view(np.float64).reshape(-1, 2)) - self._half, 0.0)
-            round_hit = np.hypot(beyond[:, 0], beyond[:, 1]) <= size[:, 0] + _TOUCH
+            round_hit = np.hypot(beyond[:, 0], beyond[:, 1]) <= size.real + _TOUCH
             hit = np.where(self._kind[row % len(self._kind)] == _RECTANGLE, hit, round_hit)
         if not np.count_nonzero(hit):
             return None
@@ -290,7 +292,7 @@ class CollisionWorld:
         away = np.abs(self._block_centre[blocks] - here.take(middle))
         away -= size // 2 * step
         block, track = (away <= self._block_reach[blocks]).nonzero()
-        return samples.take(block, axis=0).ravel(), (rows.take(block, axis=0) + track[:, None]).ravel()
+        return samples.take(block, axis=0).ravel(), rows.take(block, axis=0).ravel() + track.repeat(size)
 
     def _polygons_touch(self, k: int, m: int, pose: tuple[float, float, float, float]) -> bool:
         """Whether the ego at ``x, y, cos, sin`` meets a polygon of a track at a sample."""
@@ -346,7 +348,7 @@ def _complex(x: Array, y: Array) -> Points:
     return made
 
 
-def _rectangles_touch(shapes: Points, turn: Points, half: Array, size: Array) -> npt.NDArray[np.bool_]:
+def _rectangles_touch(shapes: Points, turn: Points, ego: Points, size: Points) -> npt.NDArray[np.bool_]:
     """Whether the ego and rectangles meet: separating axes.
 
     Parameters
@@ -355,28 +357,30 @@ def _rectangles_touch(shapes: Points, turn: Points, half: Array, size: Array) ->
         Centres of the rectangles, and half diagonals of either direction, seen from the ego; overwritten.
     turn : (n,) complex array
         Their directions, seen from the ego.
-    half : (2,) array
-        Half length and width of the ego.
-    size : (n, 2) array
-        Half length and width of the rectangles.
+    ego : () complex array
+        Half length and, as imaginary part, half width of the ego.
+    size : (n,) complex array
+        The same of the rectangles.
     """
-    hit = _reached(shapes, half)
+    hit = _reached(shapes, ego)
     if np.count_nonzero(hit):  # mostly one of the ego's own axes tells the two apart
-        shapes[1] = diagonal = complex(*half)
-        shapes[2] = diagonal.conjugate()
+        shapes[1], shapes[2] = ego, ego.conj()
         shapes *= turn.conj()
         hit &= _reached(shapes, size)
     return hit
 
 
-def _reached(shapes: Points, half: Array) -> npt.NDArray[np.bool_]:
+def _reached(shapes: Points, half: Points) -> npt.NDArray[np.bool_]:
     """Whether rectangles (3, n), as in :func:`_rectangles_touch`, meet one that lies along the axes.
 
-    Asked are these axes only; ``half`` (2,) or (n, 2) are that one's half sizes.
+    Asked are these axes only; ``half`` (n,) or () holds that one's half length and half width.
     """
-    offset, one, other = np.abs(shapes.view(np.float64).reshape(3, -1, 2))
-    meets = offset <= np.maximum(one, other) + (half + _TOUCH)
-    reached: npt.NDArray[np.bool_] = meets[:, 0] & meets[:, 1]
+    offset, one, other = np.abs(shapes.view(np.float64))  # the real and the imaginary parts in turn
+    reach = np.maximum(one, other)
+    both = reach.view(np.complex128)
+    both += half + _TOUCHING
+    meets = offset <= reach
+    reached: npt.NDArray[np.bool_] = meets[::2] & meets[1::2]
     return reached
 
 

@@ -19,6 +19,7 @@ import math
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from operator import neg
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,6 +67,8 @@ _ENGINE = 0.45
 _SURE = 1.0 - 1e-9
 # Samples at least this far apart [m] are those of a moving vehicle.
 _MOVES = 1e-9
+# Factors as arrays, because NumPy takes long to convert a plain number.
+_TWICE, _DECAY = np.array(2.0), np.array(-2.0)
 # The official integrator's error is relative to the coordinates; far from the origin [m] it hides the
 # cost's slope from the optimiser.
 _FAR = 5000.0
@@ -230,25 +233,32 @@ def _slip_angle(turn: Array, step: Array, length: Array, rear: float, slip0: flo
     map, so that the recurrence needs no trigonometric function.
     """
     if slip0 is None:
-        first = int(np.argmax(step != 0.0)) if len(step) else -1
-        bend = float(rear * turn[first] / length[first]) if first >= 0 else 0.0
-        slip0 = float(np.arcsin(min(max(bend, -0.95), 0.95)))
+        slip0 = _steady(turn, step, length, rear)
     if not len(step):
         return np.array([slip0])
     ratio = step * (0.5 / rear)
-    half = rear * turn * np.tanh(ratio) / length
-    rotation = half.copy()
-    rotation[1:] += half[:-1]
-    value = float(np.tan(0.5 * slip0))
-    tangents, decay = np.tan(0.5 * rotation).tolist(), np.exp(-2.0 * ratio).tolist()
+    quarter = (0.5 * rear) * turn * np.tanh(ratio) / length
+    half = quarter.copy()  # of the rotation between two straight pieces
+    half[1:] += quarter[:-1]
+    value = math.tan(0.5 * slip0)
+    tangents, decay = np.tan(half).tolist(), np.exp(_DECAY * ratio).tolist()
     slip = np.empty(len(step) + 1)
     slip[0] = slip0
     slip[1:] = [
         value := factor * (value + tangent) / (1.0 - value * tangent)
         for tangent, factor in zip(tangents, decay, strict=True)
     ]
-    slip[1:] = 2.0 * np.arctan(slip[1:]) + half
+    slip[1:] = _TWICE * (np.arctan(slip[1:]) + quarter)
     return slip
+
+
+def _steady(turn: Array, step: Array, length: Array, rear: float) -> float:
+    """Slip angle [rad] of steady driving where the path begins to move."""
+    if not len(step):
+        return 0.0
+    first = 0 if step[0] else int(np.argmax(step != 0.0))
+    bend = rear * float(turn[first]) / float(length[first])
+    return math.asin(min(max(bend, -0.95), 0.95))
 
 
 def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> KinematicReport:
@@ -329,7 +339,7 @@ def clearly_drivable(
     np.multiply(v, tangent, out=turning)  # rate of the orientation times rear
     np.subtract(rows[:2, 1:], rows[:2, :-1], out=rows[3:, 1:])
     low, high = np.minimum.reduce(rows, axis=1).tolist(), np.maximum.reduce(rows, axis=1).tolist()
-    largest = fastest, steepest, turn, dv, dtangent = [max(-a, b) for a, b in zip(low, high, strict=True)]
+    largest = fastest, steepest, turn, dv, dtangent = list(map(max, high, map(neg, low)))
     engine = acceleration * vehicle.a_max
     if fastest > vehicle.v_switch:
         engine = _ENGINE * vehicle.a_max * vehicle.v_switch / fastest
@@ -345,10 +355,12 @@ def clearly_drivable(
     ):
         return False
     shift, turned = _error_bounds(xy, rows[:3], orientation, largest, dt, vehicle)
+    # From one step to the next, the rear axle moves as far as simulated, or as far astray as bounded.
+    way = len(xy) * (fastest * dt + shift) + 2.0 * vehicle.rear
     return (
         turned <= _SURE * angle * ORIENTATION_TOLERANCE
         and shift <= _SURE * position * POSITION_TOLERANCE
-        and float(np.maximum.reduce(np.abs(xy), axis=None)) <= _FAR
+        and max(map(abs, xy[0].tolist())) + way <= _FAR
     )
 
 
@@ -375,7 +387,8 @@ def _error_bounds(
     moved[0] = rows[1]
     moved *= (0.5 * dt) * rows[0]
     missed = np.abs((pose - moved)[:, 1:] - (pose + moved)[:, :-1])
-    off, *shift = np.maximum.reduce(missed, axis=1).tolist()
+    off, x_off, y_off = np.maximum.reduce(missed, axis=1).tolist()
+    astray = max(x_off, y_off) if math.isfinite(x_off + y_off) else math.inf
     steep, dsteep = steepest * to_steering, dtangent * to_steering
     # between two steering angles, the tangent in the middle and the mean of the tangents
     bow = 0.25 * dsteep * dsteep * steep * (1.0 + steep * steep) / to_steering
@@ -384,7 +397,7 @@ def _error_bounds(
     dturning, dpsi = fastest * dtangent + steepest * dv, (dt * turn + off) / rear
     # directions at the end and in the middle of a step: those simulated and those used here
     spread = 0.5 * turned + dt * dturning / (12.0 * rear) + dpsi * dpsi / 12.0
-    return max(shift) + dt * (dv * dpsi / 6.0 + fastest * spread), turned
+    return astray + dt * (dv * dpsi / 6.0 + fastest * spread), turned
 
 
 def _errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:

@@ -227,6 +227,8 @@ def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
 _CELL = 1.0
 _ALONG = 0.9
 _ASIDE = 10.0
+# As arrays, because NumPy takes long to convert a plain number.
+_NONE, _AHEAD = np.array(0.0), np.array(_ALONG)
 
 
 class RoadCorridor:
@@ -246,21 +248,18 @@ class RoadCorridor:
     """
 
     def __init__(self, road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle) -> None:
-        self._half_length, half_width = 0.5 * vehicle.length, 0.5 * vehicle.width
+        self._half_length, half_width = np.array(0.5 * vehicle.length), 0.5 * vehicle.width
         diagonal = float(np.hypot(self._half_length, half_width))
         count = max(round(frame.length / _CELL), 1)
         s = np.linspace(0.0, frame.length, count + 1)
-        self._inverse, self._last = count / frame.length, count
-        self._heading = frame.heading(s)
-        axis = np.exp(1j * self._heading)
+        self._inverse, self._last = np.array(count / frame.length), np.array(float(count))
+        heading = frame.heading(s)
+        axis = np.exp(1j * heading)
         middle = np.ascontiguousarray(frame.position(s)).view(np.complex128)[:, 0]
         right, left = _room(road.region, middle, axis, _ALONG + diagonal + road.spare)
         # Seen from the band's middle, both sides are alike.
-        self._middle = middle + 0.5j * (left + right) * axis
-        self._turn = axis.conj()
-        self._reach = np.empty((count + 1, 2))
-        self._reach[:, 0] = _ALONG
-        self._reach[:, 1] = 0.5 * (left - right) - half_width - road.spare
+        self._place = np.array((middle + 0.5j * (left + right) * axis, axis.conj()))
+        self._room = np.array((heading, 0.5 * (left - right) - half_width - road.spare))
 
     def holds(self, s: Array, centre: Points, orientation: Array) -> npt.NDArray[np.bool_]:
         """Poses (K,) that are surely on the road; False says nothing.
@@ -274,13 +273,17 @@ class RoadCorridor:
         orientation : (K,) array
             Of the ego [rad], continuous with the frame's heading.
         """
-        cell = np.rint(np.minimum(np.maximum(s * self._inverse, 0.0), self._last)).astype(np.intp)
-        seen = (centre - self._middle.take(cell)) * self._turn.take(cell)
-        room = self._reach.take(cell, axis=0)
-        room -= np.abs(seen.view(np.float64).reshape(-1, 2))
+        cell = np.rint(np.minimum(np.maximum(s * self._inverse, _NONE), self._last)).astype(np.intp)
+        middle, turn = self._place.take(cell, axis=1)
+        heading, reach = self._room.take(cell, axis=1)
+        seen = (centre - middle) * turn
         # Turned by an angle t, the rectangle reaches at most half its length * |t| farther aside.
-        room[:, 1] -= self._half_length * np.abs(orientation - self._heading.take(cell))
-        return np.asarray((room[:, 0] >= 0.0) & (room[:, 1] >= 0.0))
+        aside = np.abs(orientation - heading)
+        aside *= self._half_length
+        aside += np.abs(seen.imag)
+        held: npt.NDArray[np.bool_] = aside <= reach
+        held &= np.abs(seen.real) <= _AHEAD
+        return held
 
 
 def _room(region: Any, middle: Points, axis: Points, along: float) -> tuple[Array, Array]:

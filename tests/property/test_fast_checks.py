@@ -31,6 +31,46 @@ def driven(rng, n=60, spread=5.0):
     return x, y, heading + rng.normal(0, 0.05, n)
 
 
+# ------------------------------------------------------------------- the path
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_what_keeps_to_the_path_is_carried_as_anything_else(seed):
+    rng = np.random.default_rng(seed)
+    along = np.linspace(0.0, 60.0, 60)
+    turned = np.exp(1j * rng.uniform(-3, 3)) * (along + 1j * rng.uniform(0, 5) * np.sin(along / 9.0))
+    frame = FrenetFrame.from_points(turned.view(np.float64).reshape(-1, 2))
+    n = int(rng.integers(1, 60))
+    motion = np.zeros((4, n))
+    motion[2] = rng.choice([0.0, 0.005, 0.5, 5.0]) + rng.normal(0, rng.choice([0.0, 0.1, 1.0]), n)
+    motion[0] = rng.uniform(-5, 60) + 0.025 * np.cumsum(motion[2])
+    t = 0.025 * np.arange(n)
+    kept = frame.carry(t, motion)
+    motion[1] = 1e-300  # nowhere else, but no longer nothing
+    for found, plain in zip(kept, frame.carry(t, motion), strict=True):
+        np.testing.assert_allclose(found, plain, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(kept.xy, frame.position(motion[0]), rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("sideways", [0.0, 0.3])
+def test_a_path_knows_its_steps_and_turns(sideways):
+    frame = FrenetFrame.from_points(np.column_stack((np.arange(60.0), 4.0 * np.sin(np.arange(60) / 9.0))))
+    t = 0.025 * np.arange(40)
+    motion = np.array((9.0 + 8.0 * t - t**2, sideways * t, 8.0 - 2.0 * t, sideways + 0.0 * t))
+    path = frame.carry(t, motion)
+    np.testing.assert_allclose(path.step, np.hypot(*np.diff(path.xy, axis=0).T))
+    np.testing.assert_array_equal(path.turn, np.diff(path.heading))
+    assert path.slowest == path.speed.min()
+    assert path.longest == path.step.max()
+    assert path.sharpest == np.abs(path.turn).max()
+    for row in range(4):
+        holed = motion.copy()
+        holed[row, 7] = np.nan
+        found = frame.carry(t, holed)
+        assert np.isnan(found.slowest + found.longest + found.sharpest)
+
+
 # ------------------------------------------------------------------- the road
 
 

@@ -57,7 +57,7 @@ def test_rectangles_as_in_pycrcc():
     turn = np.exp(1j * (other[:, 2] - ego[:, 2]))
     diagonal = other[:, 3:] @ [1.0, 1j]
     shapes = np.array((offset, turn * diagonal, turn * diagonal.conj()))
-    ours = _rectangles_touch(shapes, turn, np.array(HALF), other[:, 3:])
+    ours = _rectangles_touch(shapes, turn, np.array(complex(*HALF)), diagonal)
     theirs = [
         RectOBB(*HALF, e[2], e[0], e[1]).collide(RectOBB(o[3], o[4], o[2], o[0], o[1]))
         for e, o in zip(ego, other, strict=True)

@@ -336,26 +336,29 @@ class FrenetFrame:
         plane = np.empty(len(s), dtype=np.complex128)
         np.add(linear * u, c0, out=plane.view(np.float64).reshape(-1, 2).T)
         heading = base = self._continuous(np.arctan2(tangent[1], tangent[0]), index)
-        slowest = float(np.minimum.reduce(s_rate)) if len(s) else np.inf
-        forward, sideways, sign = s_rate, l_rate, None
-        if not slowest >= 0.0:
+        forward, sideways, slowest, sign = s_rate, l_rate, _least(s_rate), None
+        if not slowest >= 0.0:  # seen as if driven forwards
             sign = np.where(s_rate < 0.0, -1.0, 1.0)
             forward, sideways = sign * s_rate, sign * l_rate
         speed = forward
-        if np.count_nonzero(l) or np.count_nonzero(l_rate):
+        if np.count_nonzero(l) or np.count_nonzero(l_rate):  # many repairs keep to the path
             quadratic += c3u  # half of the second derivative
             forward = forward * _aside(plane, tangent, quadratic, l)
-            motion_here = np.empty_like(plane)
-            motion_here.real, motion_here.imag = forward, sideways
-            speed = np.abs(motion_here)
+            velocity = np.empty_like(plane)
+            velocity.real, velocity.imag = forward, sideways
+            speed = np.abs(velocity)
             heading = base + np.arctan2(sideways, forward)
-            slowest = float(np.minimum.reduce(speed)) if len(s) else np.inf
+            slowest = _least(speed)
         if not slowest >= STANDSTILL:
             heading = _held(heading, base, np.abs(speed))
         if sign is not None:
             speed = speed * sign
-            slowest = float(np.minimum.reduce(speed)) if len(s) else np.inf
+            slowest = _least(speed)
         return CartesianPath.through(t, plane, heading, speed, slowest)
+
+
+def _least(values: Array) -> float:
+    return float(np.minimum.reduce(values)) if len(values) else np.inf
 
 
 def _aside(plane: Points, tangent: Array, second: Array, l: Array) -> Array:  # noqa: E741
