@@ -15,7 +15,7 @@ from repair.collision import CollisionWorld
 from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
 from repair.metrics import peaks
 from repair.road import RoadBoundary, RoadCorridor, _grouping
-from repair.scene.frame import CartesianPath, FrenetFrame
+from repair.scene.frame import STANDSTILL, CartesianPath, FrenetFrame, _held
 from repair.scene.obstacles import Obstacle
 from repair.scene.vehicle import load_vehicle
 
@@ -51,6 +51,18 @@ def test_what_keeps_to_the_path_is_carried_as_anything_else(seed):
     for found, plain in zip(kept, frame.carry(t, motion), strict=True):
         np.testing.assert_allclose(found, plain, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(kept.xy, frame.position(motion[0]), rtol=1e-12, atol=1e-12)
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.lists(st.booleans(), min_size=1, max_size=12))
+def test_the_heading_of_a_stop_is_that_of_the_last_moving_sample(moving):
+    heading, fallback = np.arange(len(moving)) + 1.0, np.full(len(moving), -1.0)
+    last, wanted = moving.index(True) if any(moving) else None, []
+    for k, moves in enumerate(moving):
+        last = k if moves else last
+        wanted.append(-1.0 if last is None else heading[last])
+    pace = np.where(moving, STANDSTILL, 0.5 * STANDSTILL)
+    assert _held(heading, fallback, pace).tolist() == wanted
 
 
 @pytest.mark.parametrize("sideways", [0.0, 0.3])

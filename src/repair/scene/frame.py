@@ -386,8 +386,13 @@ def _pairs(x: Array, y: Array) -> Array:
 def _held(heading: Array, fallback: Array, pace: Array) -> Array:
     """Headings with those of standing samples taken from the last (else the first) moving one."""
     moving = pace >= STANDSTILL
-    if not moving.any():
+    count = np.count_nonzero(moving)
+    if not count:
         return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
+    if np.count_nonzero(moving[:count]) == count:  # it stops, and does not start again
+        held = heading.copy()
+        held[count:] = held[count - 1]
+        return held
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
     return np.asarray(heading[np.where(last < 0, int(np.argmax(moving)), last)])
 
