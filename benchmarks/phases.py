@@ -41,7 +41,7 @@ SOLVING = {
     },
     "qptr": {
         "corridor": "repair.baselines.qptr:build_corridor",
-        "QP assembly": "repair.baselines.qptr:QptrBackend._axis",
+        "QP assembly": "repair.baselines.qptr:_axis",
         "QP": "repair.baselines.qptr:solve_projection",
         "rest of the solve": "repair.baselines.qptr:QptrBackend.solve",
     },

@@ -49,13 +49,13 @@ def test_corridor_ends_before_the_box_and_holds_the_guide():
     task = stop_before(20.0)
     corridor = corridor_of(task)
     assert corridor.s[1].max() <= 20.0 - task.margin + 1e-9
-    low, high = corridor.control_bounds(5)
+    low, high = corridor.control_bounds(5, 0)
     times = np.concatenate(
         [np.linspace(a, b, 6) for a, b in zip(corridor.edges[:-1], corridor.edges[1:], strict=True)]
     )
     guide = np.interp(times, task.passing.guide.t, task.passing.guide.position[:, 0])
-    assert np.all(guide >= low[..., 0].ravel() - 1e-6)
-    assert np.all(guide <= high[..., 0].ravel() + 1e-6)
+    assert np.all(guide >= low - 1e-6)
+    assert np.all(guide <= high + 1e-6)
 
 
 def test_every_trapezoid_is_below_the_free_space():
@@ -104,10 +104,11 @@ def test_grid_samples_boxes_as_the_occupancy_does():
     for t_rep, t_end in ((0.0, 4.0), (0.33, 3.77), (4.0, 8.6)):
         task = problem(boxes, t_rep=t_rep, t_end=t_end)
         grid = time_grid(task, 7)
-        lower, upper = task.occupancy.at(grid.flat)
-        np.testing.assert_array_equal(grid.at(task.occupancy.lower).reshape(lower.shape), lower)
-        np.testing.assert_array_equal(grid.at(task.occupancy.upper).reshape(upper.shape), upper)
-        assert np.all((grid.t[:, 0] == grid.edges[:-1]) | np.isclose(grid.t[:, 0], grid.edges[:-1]))
+        lower, upper = task.occupancy.at(grid.times)
+        np.testing.assert_array_equal(grid.at(task.occupancy.lower), lower)
+        np.testing.assert_array_equal(grid.at(task.occupancy.upper), upper)
+        np.testing.assert_allclose(grid.times[grid.index[:, 0]], grid.edges[:-1])
+        np.testing.assert_allclose(grid.times[grid.index[:, -1]], grid.edges[1:])
 
 
 def test_corridor_without_obstacles_is_what_the_speed_limit_leaves():
@@ -195,7 +196,8 @@ def test_residuals_and_objective_are_those_of_the_curve():
         0.5 * (integrand[1:] + integrand[:-1]) @ np.diff(times), rel=1e-3
     )
     points = answer.curve.points
-    low, high = corridor_of(task).control_bounds(5)
+    bounds = [corridor_of(task).control_bounds(5, axis) for axis in (0, 1)]
+    low, high = (np.stack(b, axis=1).reshape(points.shape) for b in zip(*bounds, strict=True))
     excess = float(np.maximum(points - high, low - points).max())
     assert answer.residuals["corridor"] == pytest.approx(max(excess, 0.0), abs=1e-9)
     for order, name in ((1, "velocity"), (2, "acceleration"), (3, "jerk")):

@@ -5,14 +5,15 @@ vehicles with trapezoidal prism corridors and Bézier curves*, ACC 2023). Over a
 beside an obstacle is cut off by one straight line (s) or one constant (l): an under-approximation
 whose conservatism the paper blames for the failure of QPTR.
 
-Everything is sampled once at the times of :class:`TimeGrid`, piece by piece, and all pieces are
-treated together: arrays end in (M, L), pieces by times.
+Obstacles and guide are looked up once at the U times of :class:`TimeGrid`; what is a matter of single
+pieces ends in (M, L), pieces by their times, and is done for all pieces together.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +24,7 @@ __all__ = ["Corridor", "NoCorridor", "TimeGrid", "build_corridor", "time_grid"]
 
 _TOLERANCE = 1e-6
 _AROUND = np.array([-2.0, 0.0, 2.0])[:, None, None]  # the lateral room counts here along the guide [m]
-_MIRROR = np.array([-1.0, 1.0])[:, None, None]
-_SAME = 1e-9  # times [s] and bounds [m] closer than this are one
+_SAME = 1e-9  # times [s] closer than this are one
 
 
 class NoCorridor(Exception):
@@ -39,52 +39,45 @@ class TimeGrid:
     ----------
     edges : (M + 1,) array
         Times at which the pieces meet [s].
-    t : (M, L) array
-        Times of every piece from edge to edge [s]; a shorter row repeats its last time.
-    flat : (M L,) array
-        The same in a row.
-    base : (C,) int array
-        Time through which each candidate line of :func:`_line_below` goes: that of the first point
-        of each of the ``len(second)`` pairs, then all times once.
-    second : (C - L,) int array
-        Second point of each pair.
-    span : (M, C - L) array
-        Time between the points of each pair [s].
-    run : (L, M, C) array
-        Time since that of ``base`` [s].
-    line : (M, C) bool array
-        Two different times make the line.
-    step, after : (M L,) int array
+    times : (U,) array
+        All times [s].
+    index : (M, L) int array
+        Which of them belong to each piece, from edge to edge; a shorter row repeats its last one.
+    base, second : (C,) int array
+        The two points of each candidate line of :func:`_line_below`, among those of a piece and the
+        same again a piece later.
+    ratio : (L, M, C) array
+        How far each time is on the way from one to the other; NaN where both are one.
+    step, after : (U,) int array
         Steps of the occupancy before and after each time, the same where the time is a step.
-    share : (M L, 1) array or None
+    share : (U, 1) array or None
         How far each time is on the way from one to the other, NaN outside of the occupancy; None where
         all times are steps.
     """
 
     edges: Array
-    t: Array
-    flat: Array
+    times: Array
+    index: npt.NDArray[np.intp]
     base: npt.NDArray[np.intp]
     second: npt.NDArray[np.intp]
-    span: Array
-    run: Array
-    line: npt.NDArray[np.bool_]
+    ratio: Array
     step: npt.NDArray[np.intp]
     after: npt.NDArray[np.intp]
     share: Array | None
 
     def at(self, corners: Array) -> Array:
-        """Boxes' corners (N, M, L, 2) from those at the steps (N, T, 2), as ``Occupancy.at`` has them."""
+        """Boxes' corners (N, U, 2) from those at the steps (N, T, 2), as ``Occupancy.at`` has them."""
         values = corners.take(self.step, axis=1)
         if self.share is not None:
             values += self.share * (corners.take(self.after, axis=1) - values)
-        return values.reshape(len(values), *self.t.shape, 2)
+        return values
 
 
 @lru_cache(maxsize=32)
 def _candidates(count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     first, second = np.triu_indices(count, k=1)
-    return np.concatenate([first, np.arange(count)]), second
+    every = np.arange(count)
+    return np.concatenate([first, every]), np.concatenate([second, count + every])
 
 
 @lru_cache(maxsize=128)
@@ -95,15 +88,13 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     times = times[np.concatenate([[True], np.diff(times) > _SAME])]
     first = np.searchsorted(times, edges[:-1] - _SAME)
     last = np.searchsorted(times, edges[1:] + _SAME, side="right") - 1
-    t = times[np.minimum(first[:, None] + np.arange((last - first).max() + 1), last[:, None])]
-    base, second = _candidates(t.shape[1])
-    span = t[:, second] - t[:, base[: len(second)]]
-    line = np.concatenate([span > 0.0, np.ones_like(t, dtype=np.bool_)], axis=1)
-    span[span <= 0.0] = 1.0
-    run = t.T[:, :, None] - t[:, base]
-    return TimeGrid(
-        edges, frozen(t), frozen(t.ravel()), base, second, span, run, line, *_steps(t.ravel(), steps)
-    )
+    index = np.minimum(first[:, None] + np.arange((last - first).max() + 1), last[:, None])
+    base, second = _candidates(index.shape[1])
+    t = times[index]
+    span = np.hstack([t, t + t[:, -1:] - t[:, :1]])[:, second] - t[:, base]
+    span[span <= 0.0] = np.nan
+    ratio = (t.T[:, :, None] - t[:, base]) / span
+    return TimeGrid(edges, frozen(times), index, base, second, frozen(ratio), *_steps(times, steps))
 
 
 def _steps(times: Array, steps: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array | None]:
@@ -124,12 +115,13 @@ def time_grid(problem: RepairProblem, pieces: int) -> TimeGrid:
 
 
 @lru_cache(maxsize=16)
-def _fractions(degree: int) -> Array:
-    return frozen(np.linspace(0.0, 1.0, degree + 1))
+def _blend(degree: int) -> Array:
+    """Map (2, degree + 1) from a line's ends to its values at the times of the control points."""
+    share = np.linspace(0.0, 1.0, degree + 1)
+    return frozen([1.0 - share, share])
 
 
-@dataclass(frozen=True)
-class Corridor:
+class Corridor(NamedTuple):
     """Room of M pieces.
 
     Attributes
@@ -146,13 +138,11 @@ class Corridor:
     s: Array
     l: Array  # noqa: E741
 
-    def control_bounds(self, degree: int) -> Array:
-        """Bounds (2, M, degree + 1, 2) of the control points: lower and upper, piece, point, axis."""
-        bounds = np.empty((2, len(self.edges) - 1, degree + 1, 2))
-        begin, end = self.s[..., :1], self.s[..., 1:]
-        bounds[..., 0] = begin + _fractions(degree) * (end - begin)
-        bounds[..., 1] = self.l[..., None]
-        return bounds
+    def control_bounds(self, degree: int, axis: int) -> Array:
+        """Lower and upper bounds (2, M (degree + 1)) of one axis's control points, piece after piece."""
+        if axis == 0:
+            return np.asarray(self.s @ _blend(degree)).reshape(2, -1)
+        return np.repeat(self.l, degree + 1, axis=1)
 
 
 def build_corridor(problem: RepairProblem, grid: TimeGrid, reference: Array | None = None) -> Corridor:
@@ -163,8 +153,8 @@ def build_corridor(problem: RepairProblem, grid: TimeGrid, reference: Array | No
     problem : RepairProblem
     grid : TimeGrid
         Of the problem.
-    reference : (M L, 2) array, optional
-        Position of the reference at ``grid.flat``, if it is known already.
+    reference : (U, 2) array, optional
+        Position of the reference at ``grid.times``, if it is known already.
 
     Raises
     ------
@@ -172,72 +162,120 @@ def build_corridor(problem: RepairProblem, grid: TimeGrid, reference: Array | No
         If it is empty somewhere, or does not contain the start.
     """
     if reference is None:
-        reference = problem.reference.sample(grid.flat).position
-    guide = _guide(problem, grid, reference)
-    along, sideways = _walls(problem, grid, *guide)
-    # A lower bound is the upper bound of what is mirrored.
-    ends = _lines_below(grid, _MIRROR * along, _MIRROR * guide[0])
+        reference = problem.reference.sample(grid.times).position
+    s, l = _guide(problem, grid, reference)  # noqa: E741
+    start = float(problem.start[0, 0])
+    farthest = start + problem.limits.v_max * (problem.t_end - problem.t_rep) + 1.0
+    pieces = len(grid.index)
+    ends, sideways = np.empty((2, pieces, 2)), np.empty((2, pieces))
+    ends[0], ends[1], sideways[0], sideways[1] = start - 1.0, farthest, -np.inf, np.inf
     if problem.lateral:
-        _cut_to_road(problem, guide[0], sideways)
-    corridor = Corridor(grid.edges, _MIRROR * ends, sideways)
+        lower, upper = _walls_around(problem, grid, s, l, sideways)
+    else:
+        lower, upper = _walls_along(problem, grid, s, l)
+    if lower is not None or upper is not None or problem.lateral:
+        s = s.take(grid.index)
+    if lower is not None:  # a lower bound is the upper bound of what is mirrored
+        np.negative(_line_below(grid, -np.maximum(lower, start - 1.0), -s), out=ends[0])
+    if upper is not None:
+        ends[1] = _line_below(grid, np.minimum(upper, farthest), s)
+    if problem.lateral:
+        _cut_to_road(problem, s, sideways)
+    corridor = Corridor(grid.edges, ends, sideways)
     _require_open(problem, corridor)
     return corridor
 
 
 def _guide(problem: RepairProblem, grid: TimeGrid, reference: Array) -> tuple[Array, Array]:
-    """Of the guide, s and l (M, L); without lateral freedom its l is that of the reference."""
+    """Of the guide, s and l (U,); without lateral freedom its l is that of the reference."""
     s, l = reference[:, 0], reference[:, 1]  # noqa: E741
     if problem.passing is not None:
         path = problem.passing.guide
-        s = np.interp(grid.flat, path.t, path.position[:, 0])
+        s = np.interp(grid.times, path.t, path.position[:, 0])
         if problem.lateral:
-            l = np.interp(grid.flat, path.t, path.position[:, 1])  # noqa: E741
-    return s.reshape(grid.t.shape), l.reshape(grid.t.shape)
+            l = np.interp(grid.times, path.t, path.position[:, 1])  # noqa: E741
+    return s, l
 
 
-def _walls(
+def _boxes(problem: RepairProblem, grid: TimeGrid) -> tuple[Array, Array]:
+    """Corners (N, U, 2) of the boxes with their margin; NaN where one is not there."""
+    lower, upper = grid.at(problem.occupancy.lower), grid.at(problem.occupancy.upper)
+    lower -= problem.margin
+    upper += problem.margin
+    return lower, upper
+
+
+def _walls_along(
     problem: RepairProblem,
     grid: TimeGrid,
     s: Array,
     l: Array,  # noqa: E741
-) -> tuple[Array, Array]:
-    """What the obstacles leave: smallest and largest s (2, M, L), smallest and largest l (2, M).
+) -> tuple[Array | None, Array | None]:
+    """Smallest and largest s (M, L) where l (U,) is given; None where no box bounds it.
+
+    A box beside the path is no matter, and the others can only be passed along s. The rooms behind
+    and ahead of one add up to minus its length, so a guide that keeps one of these sides over a piece
+    has more room there at each time: the sides of a piece are those of its times.
+    """
+    lower, upper = _boxes(problem, grid)
+    across = lower[..., 1] < l
+    across &= l < upper[..., 1]
+    lower, upper = lower[..., 0], upper[..., 0]
+    ahead = s - upper > lower - s
+    behind = across > ahead
+    ahead &= across
+    smallest, largest = _nearest(lower, upper, behind, ahead)
+    return (
+        None if smallest is None else smallest.take(grid.index),
+        None if largest is None else largest.take(grid.index),
+    )
+
+
+def _nearest(
+    lower: Array, upper: Array, behind: npt.NDArray[np.bool_], ahead: npt.NDArray[np.bool_]
+) -> tuple[Array | None, Array | None]:
+    """Largest of the ``upper`` sides (N, ...) of boxes to stay ahead of, smallest of the ``lower`` ones."""
+    smallest = largest = None
+    if np.count_nonzero(ahead):
+        smallest = np.maximum.reduce(upper, where=ahead, initial=-np.inf)
+    if np.count_nonzero(behind):
+        largest = np.minimum.reduce(lower, where=behind, initial=np.inf)
+    return smallest, largest
+
+
+def _walls_around(
+    problem: RepairProblem,
+    grid: TimeGrid,
+    s: Array,
+    l: Array,  # noqa: E741
+    sideways: Array,
+) -> tuple[Array | None, Array | None]:
+    """Smallest and largest s (M, L) as above, where boxes can be passed sideways too: ``sideways`` (2, M).
 
     Over a piece an obstacle is kept on that side which the guide keeps all the time; where the guide
     changes sides within the piece, each time has its own.
     """
-    start, farthest = problem.start[0, 0], problem.limits.v_max * (problem.t_end - problem.t_rep) + 1.0
-    along, sideways = np.empty((2, *s.shape)), np.empty((2, len(s)))
-    along[0], along[1], sideways[0], sideways[1] = start - 1.0, start + farthest, -np.inf, np.inf
-    lower, upper = grid.at(problem.occupancy.lower), grid.at(problem.occupancy.upper)
-    lower -= problem.margin
-    upper += problem.margin
-    # Where l is given, a box beside the path is no matter; nor is one that is not there (NaN) anywhere.
-    across = (lower[..., 1] < l) & (l < upper[..., 1])
-    present = np.isfinite(lower).all(axis=3) if problem.lateral else across
-    if not present.any():
-        return along, sideways
-    # In the order of Side; where l is given, a box can only be passed along s.
-    room = np.empty((4 if problem.lateral else 2, *present.shape))
+    lower, upper = _boxes(problem, grid)
+    present = np.isfinite(lower).all(axis=2)
+    if not np.count_nonzero(present):
+        return None, None
+    room = np.empty((4, *present.shape))
     np.subtract(lower[..., 0], s, out=room[Side.BEHIND])
     np.subtract(s, upper[..., 0], out=room[Side.AHEAD])
-    if problem.lateral:
-        np.subtract(l, upper[..., 1], out=room[Side.LEFT])
-        np.subtract(lower[..., 1], l, out=room[Side.RIGHT])
+    np.subtract(l, upper[..., 1], out=room[Side.LEFT])
+    np.subtract(lower[..., 1], l, out=room[Side.RIGHT])
     np.copyto(room, np.inf, where=~present)
-    side = _sides(room)
-    behind, ahead = present & (side == Side.BEHIND), present & (side == Side.AHEAD)
-    np.maximum.reduce(upper[..., 0], where=ahead, initial=start - 1.0, out=along[0])
-    np.minimum.reduce(lower[..., 0], where=behind, initial=start + farthest, out=along[1])
-    if problem.lateral:
-        left, right = present & (side == Side.LEFT), present & (side == Side.RIGHT)
-        np.maximum.reduce(upper[..., 1], axis=(0, 2), where=left, initial=-np.inf, out=sideways[0])
-        np.minimum.reduce(lower[..., 1], axis=(0, 2), where=right, initial=np.inf, out=sideways[1])
-    return along, sideways
+    side = _sides(room.take(grid.index, axis=2))
+    present = present.take(grid.index, axis=1)
+    lower, upper = lower.take(grid.index, axis=1), upper.take(grid.index, axis=1)
+    behind, ahead, left, right = (present & (side == k) for k in range(4))  # in the order of Side
+    np.maximum.reduce(upper[..., 1], axis=(0, 2), where=left, initial=-np.inf, out=sideways[0])
+    np.minimum.reduce(lower[..., 1], axis=(0, 2), where=right, initial=np.inf, out=sideways[1])
+    return _nearest(lower[..., 0], upper[..., 0], behind, ahead)
 
 
 def _sides(room: Array) -> npt.NDArray[np.intp]:
-    """Side of each obstacle, (N, M, L) or (N, M, 1), from the room (sides, N, M, L) on each.
+    """Side of each obstacle, (N, M, L) or (N, M, 1), from the room (4, N, M, L) on each.
 
     The room is inf where the obstacle is not there.
     """
@@ -247,34 +285,23 @@ def _sides(room: Array) -> npt.NDArray[np.intp]:
     return kept if steady.all() else np.where(steady[..., None], kept, room.argmax(axis=0))
 
 
-def _lines_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
-    """End values (2, M, 2) of the line below each of ``values`` (2, M, L), leaving ``guide`` the most room.
+def _line_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
+    """End values (M, 2) of the line below each of ``values`` (M, L), leaving ``guide`` the most room.
 
     Candidates are the lines through two of the points, and the lines through one of them with the
-    guide's mean slope; the best is that of largest smallest distance to the guide. What is constant
-    is its own line.
+    guide's mean slope; the best is that of largest smallest distance to the guide.
     """
-    count = values.shape[2]
-    values, guide = values.reshape(-1, count), guide.reshape(-1, count)
-    ends = values[:, :: count - 1].copy()
-    bent = np.flatnonzero(np.maximum.reduce(values, axis=1) - np.minimum.reduce(values, axis=1) >= _SAME)
-    if len(bent):
-        piece, pairs, times = bent % len(grid.t), len(grid.second), grid.t
-        v, g, t = values.take(bent, axis=0), guide.take(bent, axis=0), times.take(piece, axis=0)
-        through = v.take(grid.base, axis=1)
-        slope = np.empty(through.shape)
-        rise = v.take(grid.second, axis=1) - through[:, :pairs]
-        np.divide(rise, grid.span.take(piece, axis=0), out=slope[:, :pairs])
-        slope[:, pairs:] = ((g[:, -1] - g[:, 0]) / (t[:, -1] - t[:, 0]))[:, None]
-        lines = grid.run.take(piece, axis=1)
-        lines *= slope
-        lines += through
-        below = np.logical_and.reduce(lines <= v.T[:, :, None] + _TOLERANCE)
-        below &= grid.line.take(piece, axis=0)
-        gap = np.minimum.reduce(lines - g.T[:, :, None])
-        best = np.where(below, gap, -np.inf).argmax(axis=1)
-        ends[bent] = lines[:: count - 1, np.arange(len(bent)), best].T
-    return ends.reshape(2, -1, 2)
+    moved = values + (guide[:, -1:] - guide[:, :1])  # where the guide's mean slope leads in a piece's time
+    points = np.concatenate((values, moved), axis=1)
+    through = points.take(grid.base, axis=1)
+    rise = points.take(grid.second, axis=1)
+    rise -= through
+    lines = grid.ratio * rise
+    lines += through
+    below = np.logical_and.reduce(lines <= (values + _TOLERANCE).T[:, :, None])
+    gap = np.minimum.reduce(lines - guide.T[:, :, None])
+    best = np.where(below, gap, -np.inf).argmax(axis=1)
+    return np.asarray(lines[:: len(lines) - 1, np.arange(len(best)), best].T)
 
 
 def _cut_to_road(problem: RepairProblem, s: Array, sideways: Array) -> None:
@@ -300,7 +327,10 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
     if problem.lateral and not right[0] - _TOLERANCE <= start[1] <= left[0] + _TOLERANCE:
         raise NoCorridor("the start lies beside the first piece of the corridor")
     least = _least_progress(problem, edges)
-    if (np.maximum(low, least) <= high).all() and (right <= left).all():
+    closed = np.maximum(low, least) > high
+    if problem.lateral:
+        closed |= right > left
+    if not np.count_nonzero(closed):
         return
     for lower, upper, where in ((low, high, "along the path"), (right, left, "sideways")):
         if (lower > upper + _TOLERANCE).any():
@@ -328,10 +358,7 @@ def _at_edges(first: Array, last: Array) -> Array:
 
 def _least_progress(problem: RepairProblem, edges: Array) -> Array:
     """Where full braking within the limits leads (M + 1,) [m]; no curve can stay farther back."""
-    s, speed, braking = (
-        float(problem.start[0, 0]),
-        max(float(problem.start[1, 0]), 0.0),
-        -problem.limits.a_min,
-    )
+    s, braking = float(problem.start[0, 0]), -problem.limits.a_min
+    speed = max(float(problem.start[1, 0]), 0.0)
     tau = np.minimum(edges - edges[0], speed / braking)
-    return np.asarray(s + speed * tau - 0.5 * braking * tau**2)
+    return np.asarray(s + tau * (speed - (0.5 * braking) * tau))

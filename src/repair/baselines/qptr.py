@@ -9,9 +9,11 @@ for the checker to say. Nothing couples the axes, so each is a QP of its own.
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +23,7 @@ from repair.baselines.corridor import NoCorridor, build_corridor, time_grid
 from repair.baselines.qp import require_solver, solve_projection
 from repair.config import Config, QptrConfig
 from repair.errors import BackendError
-from repair.types import Array, Curve, Limits, RepairProblem, SolveResult, SolveStatus, frozen
+from repair.types import Array, Curve, Limits, RepairProblem, SolveResult, SolveStatus
 
 __all__ = ["QptrBackend", "make"]
 
@@ -44,8 +46,6 @@ class _AxisQp:
     ----------
     structure : QpStructure
     points : (N, 3 + K) array
-    values : (R', N) array
-        Map from control points to their values.
     families : (6,) int array
         Where each of ``_FAMILIES`` begins in the values.
     bounds : (2, R') array
@@ -59,15 +59,15 @@ class _AxisQp:
     scale : (B,) array
     at_rest : (B, 3 + K) array
         Map from a task to the bounded values at z = 0, divided by ``scale``.
-    terms : (2 K, N) array
-        Map from control points to the terms whose squares add up to the objective: jerk, deviation.
-    weights : (K,) array
-        Of the deviation in ``terms``.
+    judged : (R' + 2 K, N) array
+        Map from control points to their values, and to the terms whose squares add up to the objective:
+        jerk, deviation. The same for both axes.
+    weights : (K, 1) array
+        Of the deviation in these terms.
     """
 
     structure: QpStructure
     points: Array
-    values: Array
     families: npt.NDArray[np.intp]
     bounds: Array
     bounded: npt.NDArray[np.intp]
@@ -75,26 +75,28 @@ class _AxisQp:
     rows: Array
     scale: Array
     at_rest: Array
-    terms: Array
+    judged: Array
     weights: Array
 
-    def objective(self, x: Array, task: Array) -> float:
-        """Jerk and deviation from the task's reference of the control points ``x`` (N,)."""
-        terms = self.terms @ x
-        terms[len(self.weights) :] -= self.weights * task[3:]
-        return float(terms @ terms)
+    def objective(self, terms: Array, references: Array) -> float:
+        """Jerk and deviation from the ``references`` (K, 2), of the ``terms`` (2 K, 2) of both axes."""
+        terms[len(self.weights) :] -= self.weights * references
+        return float(np.vdot(terms, terms))
 
-    def violations(self, x: Array, bounds: Array) -> Array:
+    def violations(self, values: Array, bounds: Array) -> Array:
         """Largest violation of each of ``_FAMILIES``, negative where a bound is nowhere touched."""
-        values = self.values @ x
         excess = np.maximum(values - bounds[1], bounds[0] - values)
         return np.asarray(np.maximum.reduceat(excess, self.families))
 
     def broken(self, left: Array, name: str) -> str:
         """Which bound the start alone breaks, from the room ``left`` (2, B) to the bounds; "" if none."""
-        excess = np.maximum(left[0], -left[1])[self.free :]
-        if not excess.max(initial=0.0) > _START:
+        left = left[:, self.free :]
+        if (
+            np.maximum.reduce(left[0], initial=0.0) <= _START
+            and np.minimum.reduce(left[1], initial=0.0) >= -_START
+        ):
             return ""
+        excess = np.maximum(left[0], -left[1])
         family = np.searchsorted(self.families, self.bounded[self.free :], side="right") - 1
         worst = [excess[family == k].max(initial=0.0) for k in range(len(_WORDS))]
         return "; ".join(
@@ -137,11 +139,10 @@ def _axis_qp(
         bounds[:, families[k] : families[k + 1]] = np.array(bound)[:, None]
         if k < 3:  # speed and acceleration at the start are the reference's doing, not the repair's
             bounds[:, families[k]] = -np.inf, np.inf
-    weights = np.sqrt(w_deviation * s.weights)
+    weights = np.sqrt(w_deviation * s.weights)[:, None]
     return _AxisQp(
         structure=s,
         points=points,
-        values=values,
         families=families,
         bounds=bounds,
         bounded=bounded,
@@ -149,9 +150,7 @@ def _axis_qp(
         rows=np.vstack(s.reach)[bounded[:free]] / scale[:free, None],
         scale=scale,
         at_rest=values[bounded] @ points / scale[:, None],
-        terms=np.vstack(
-            [np.sqrt(w_jerk * s.weights)[:, None] * s.jerk_at_nodes, weights[:, None] * s.at_nodes]
-        ),
+        judged=np.vstack([values, np.sqrt(w_jerk * s.weights)[:, None] * s.jerk_at_nodes, weights * s.at_nodes]),
         weights=weights,
     )
 
@@ -163,8 +162,7 @@ def _derivative_bounds(limits: Limits, axis: int) -> tuple[tuple[float, float], 
     return (-limits.v_lat, limits.v_lat), (-limits.a_lat, limits.a_lat), (-limits.j_lat, limits.j_lat)
 
 
-@dataclass(frozen=True)
-class _Axis:
+class _Axis(NamedTuple):
     """One axis of one problem.
 
     Attributes
@@ -232,7 +230,7 @@ class QptrBackend:
                 f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration"
             )
         try:
-            axes, reference = self._axes(problem, duration)
+            axes, tasks = self._axes(problem, duration)
         except NoCorridor as closed:
             spent = time.perf_counter() - begin
             return SolveResult(SolveStatus.NO_CORRIDOR, build_time=spent, detail=str(closed))
@@ -253,7 +251,7 @@ class QptrBackend:
             found.append(answer.z)
             words.append(answer.detail)
         solved = time.perf_counter()
-        curve, objective, residuals = _solution(problem, axes, found, reference)
+        curve, objective, residuals = _solution(problem, axes, found, tasks)
         return SolveResult(
             status=SolveStatus.SOLVED,
             curve=curve,
@@ -265,8 +263,8 @@ class QptrBackend:
         )
 
     def _axes(self, problem: RepairProblem, duration: float) -> tuple[list[_Axis], Array]:
-        """The QP of each axis, and the reference at the quadrature nodes (K, 2)."""
-        pieces = max(1, int(np.ceil(duration / self.config.spacing - 1e-9)))
+        """The QP of each axis that is planned, and the tasks of both axes (2, 3 + K)."""
+        pieces = max(1, math.ceil(duration / self.config.spacing - 1e-9))
         grid = time_grid(problem, pieces)
         # Rounded, so that repairs of the same duration share what has been built for it.
         length = round(duration / pieces, 12)
@@ -275,54 +273,53 @@ class QptrBackend:
             _axis_qp(axis, problem.limits, pieces, length, c.degree, c.continuity, c.w_jerk, c.w_deviation)
             for axis in range(2 if problem.lateral else 1)
         ]
-        times = np.concatenate([grid.flat, problem.t_rep + qps[0].structure.nodes])
-        positions = problem.reference.sample(times).position
-        reference = positions[grid.flat.size :]
-        bounds = build_corridor(problem, grid, positions[: grid.flat.size]).control_bounds(c.degree)
-        return [
-            self._axis(problem, qp, bounds[..., axis].reshape(2, -1), reference, axis)
-            for axis, qp in enumerate(qps)
-        ], reference
-
-    def _axis(
-        self, problem: RepairProblem, qp: _AxisQp, corridor: Array, reference: Array, axis: int
-    ) -> _Axis:
+        times = np.concatenate((grid.times, problem.t_rep + qps[0].structure.nodes))
+        reference = problem.reference.sample(times).position
+        count = len(grid.times)
+        corridor = build_corridor(problem, grid, reference[:count])
         # s from its start: what is left are numbers of the same size on both axes
-        shift = _shift(problem, axis)
-        task = np.concatenate([problem.start[:, axis], reference[:, axis]])
-        task[0] -= shift
-        task[3:] -= shift
-        bounds = qp.bounds.copy()
-        np.subtract(corridor, shift, out=bounds[:, : qp.families[1]])
-        bounds[:, qp.families[4] : qp.families[5]] = task[:3]
-        left = bounds.take(qp.bounded, axis=1)
-        left /= qp.scale
-        left -= qp.at_rest @ task
-        return _Axis(qp, task, bounds, left[0, : qp.free], left[1, : qp.free], qp.broken(left, "sl"[axis]))
+        shift = float(problem.start[0, 0])
+        tasks = np.empty((2, 3 + len(times) - count))
+        tasks[:, :3], tasks[:, 3:] = problem.start.T, reference[count:].T
+        tasks[0, 3:] -= shift
+        tasks[0, 0] = 0.0
+        return [
+            _axis(qp, tasks[axis], corridor.control_bounds(c.degree, axis), 0.0 if axis else shift, "sl"[axis])
+            for axis, qp in enumerate(qps)
+        ], tasks
 
 
-def _shift(problem: RepairProblem, axis: int) -> float:
-    return float(problem.start[0, 0]) if axis == 0 else 0.0
+def _axis(qp: _AxisQp, task: Array, corridor: Array, shift: float, name: str) -> _Axis:
+    """The bounds of what is free; those of the control points are the ``corridor`` (2, N), shifted."""
+    bounds = qp.bounds.copy()
+    np.subtract(corridor, shift, out=bounds[:, : qp.families[1]])
+    bounds[:, qp.families[4] : qp.families[5]] = task[:3]
+    left = bounds.take(qp.bounded, axis=1)
+    left /= qp.scale
+    left -= qp.at_rest @ task
+    return _Axis(qp, task, bounds, left[0, : qp.free], left[1, : qp.free], qp.broken(left, name))
 
 
 def _solution(
-    problem: RepairProblem, axes: list[_Axis], z: list[Array], reference: Array
+    problem: RepairProblem, axes: list[_Axis], z: list[Array], tasks: Array
 ) -> tuple[BernsteinCurve, float, dict[str, float]]:
     """Curve, objective, and the largest violation of every family of constraints in their own units."""
-    s = axes[0].qp.structure
-    points = np.empty((s.pieces, s.degree + 1, 2))
-    columns = points.reshape(-1, 2)
-    objective, worst = 0.0, np.zeros(len(_FAMILIES))
+    qp = axes[0].qp
+    s = qp.structure
+    x = np.empty((len(s.times), 2))
     for axis, (a, free) in enumerate(zip(axes, z, strict=True)):
-        x = a.qp.points @ a.task + a.qp.structure.basis @ free
-        np.add(x, _shift(problem, axis), out=columns[:, axis])
-        objective += a.qp.objective(x, a.task)
-        worst = np.maximum(worst, a.qp.violations(x, a.bounds))
+        np.add(a.qp.points @ a.task, a.qp.structure.basis @ free, out=x[:, axis])
     if not problem.lateral:
-        task = np.concatenate([problem.start[:, 1], reference[:, 1]])
-        columns[:, 1] = s.follow @ task
-        objective += axes[0].qp.objective(columns[:, 1], task)
-    curve = BernsteinCurve(problem.t_rep, s.duration, frozen(points))
+        x[:, 1] = s.follow @ tasks[1]
+    judged = qp.judged @ x
+    count = qp.bounds.shape[1]
+    worst = np.zeros(len(_FAMILIES))
+    for axis, a in enumerate(axes):
+        worst = np.maximum(worst, qp.violations(judged[:count, axis], a.bounds))
+    objective = qp.objective(judged[count:], tasks[:, 3:].T)
+    x[:, 0] += problem.start[0, 0]
+    x.setflags(write=False)
+    curve = BernsteinCurve(problem.t_rep, s.duration, x.reshape(s.pieces, -1, 2))
     return curve, objective, dict(zip(_FAMILIES, worst.tolist(), strict=True))
 
 
