@@ -94,6 +94,8 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     span = np.hstack([t, t + t[:, -1:] - t[:, :1]])[:, second] - t[:, base]
     span[span <= 0.0] = np.nan
     ratio = (t.T[:, :, None] - t[:, base]) / span
+    # In this order of memory: products and reductions are several times as fast as in that of the transpose.
+    ratio = np.ascontiguousarray(ratio)
     return TimeGrid(edges, frozen(times), index, base, second, frozen(ratio), *_steps(times, steps))
 
 

@@ -12,6 +12,7 @@ and its conversions take longer than daqp does. Every other solver goes through 
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from functools import lru_cache
@@ -239,7 +240,7 @@ def _violation(rows: Array, lower: Array, upper: Array, z: Array) -> float:
 
 def _combined(rows: Array, lower: Array, upper: Array, y: Array) -> tuple[Array, float]:
     """``rows.T @ y`` and the largest value that the bounds allow for ``y @ (rows @ z)``."""
-    used = np.flatnonzero(y)
+    used = y.nonzero()[0]
     y = y.take(used)
     allowed = np.where(y > 0.0, upper.take(used), lower.take(used))
     return y @ rows.take(used, axis=0), float(y @ allowed)
@@ -266,11 +267,11 @@ def _proven_violation(rows: Array, lower: Array, upper: Array) -> float:
     hessian, linear, kinds = _frame(rows.shape[1], len(rows), 8)
     _, _, flag, info = daqp.solve(hessian, linear, rows, upper, lower, kinds, rho_soft=_SOFT)
     y = info["lam"]
-    if flag <= 0 or not np.isfinite(y).all() or not y.any():
+    total = float(np.add.reduce(np.abs(y)))
+    if flag <= 0 or not 0.0 < total < np.inf:  # NaN is neither
         return 0.0
-    y = y / np.abs(y).max()
     combination, allowed = _combined(rows, lower, upper, y)
-    found = (-allowed - _FAR * float(np.linalg.norm(combination))) / float(np.abs(y).sum())
+    found = (-allowed - _FAR * math.sqrt(combination @ combination)) / total
     return max(found, 0.0)
 
 

@@ -62,7 +62,7 @@ class _AxisQp:
     judged : (R' + 2 K, N) array
         Map from control points to their values, and to the terms whose squares add up to the objective:
         jerk, deviation. The same for both axes.
-    weights : (K, 1) array
+    weights : (K,) array
         Of the deviation in these terms.
     """
 
@@ -78,10 +78,10 @@ class _AxisQp:
     judged: Array
     weights: Array
 
-    def objective(self, terms: Array, references: Array) -> float:
-        """Jerk and deviation from the ``references`` (K, 2), of the ``terms`` (2 K, 2) of both axes."""
-        terms[len(self.weights) :] -= self.weights * references
-        return float(np.vdot(terms, terms))
+    def objective(self, terms: Array, task: Array) -> float:
+        """Jerk and deviation from the task's reference, of the ``terms`` (2 K,) without it."""
+        terms[len(self.weights) :] -= self.weights * task[3:]
+        return float(terms @ terms)
 
     def violations(self, values: Array, bounds: Array) -> Array:
         """Largest violation of each of ``_FAMILIES``, negative where a bound is nowhere touched."""
@@ -139,7 +139,7 @@ def _axis_qp(
         bounds[:, families[k] : families[k + 1]] = np.array(bound)[:, None]
         if k < 3:  # speed and acceleration at the start are the reference's doing, not the repair's
             bounds[:, families[k]] = -np.inf, np.inf
-    weights = np.sqrt(w_deviation * s.weights)[:, None]
+    weights = np.sqrt(w_deviation * s.weights)
     return _AxisQp(
         structure=s,
         points=points,
@@ -150,7 +150,9 @@ def _axis_qp(
         rows=np.vstack(s.reach)[bounded[:free]] / scale[:free, None],
         scale=scale,
         at_rest=values[bounded] @ points / scale[:, None],
-        judged=np.vstack([values, np.sqrt(w_jerk * s.weights)[:, None] * s.jerk_at_nodes, weights * s.at_nodes]),
+        judged=np.vstack(
+            [values, np.sqrt(w_jerk * s.weights)[:, None] * s.jerk_at_nodes, weights[:, None] * s.at_nodes]
+        ),
         weights=weights,
     )
 
@@ -304,22 +306,22 @@ def _solution(
     problem: RepairProblem, axes: list[_Axis], z: list[Array], tasks: Array
 ) -> tuple[BernsteinCurve, float, dict[str, float]]:
     """Curve, objective, and the largest violation of every family of constraints in their own units."""
-    qp = axes[0].qp
-    s = qp.structure
-    x = np.empty((len(s.times), 2))
+    qp, s = axes[0].qp, axes[0].qp.structure
+    points, count = np.zeros((len(s.times), 2)), qp.bounds.shape[1]
+    objective, worst = 0.0, np.zeros(len(_FAMILIES))
     for axis, (a, free) in enumerate(zip(axes, z, strict=True)):
-        np.add(a.qp.points @ a.task, a.qp.structure.basis @ free, out=x[:, axis])
-    if not problem.lateral:
-        x[:, 1] = s.follow @ tasks[1]
-    judged = qp.judged @ x
-    count = qp.bounds.shape[1]
-    worst = np.zeros(len(_FAMILIES))
-    for axis, a in enumerate(axes):
-        worst = np.maximum(worst, qp.violations(judged[:count, axis], a.bounds))
-    objective = qp.objective(judged[count:], tasks[:, 3:].T)
-    x[:, 0] += problem.start[0, 0]
-    x.setflags(write=False)
-    curve = BernsteinCurve(problem.t_rep, s.duration, x.reshape(s.pieces, -1, 2))
+        x = a.qp.points @ a.task + a.qp.structure.basis @ free
+        judged = qp.judged @ x
+        worst = np.maximum(worst, qp.violations(judged[:count], a.bounds))
+        objective += qp.objective(judged[count:], a.task)
+        points[:, axis] = x
+    points[:, 0] += problem.start[0, 0]
+    if not problem.lateral and np.count_nonzero(tasks[1]):  # most references are the path itself
+        x = s.follow @ tasks[1]
+        objective += qp.objective(qp.judged[count:] @ x, tasks[1])
+        points[:, 1] = x
+    points.setflags(write=False)
+    curve = BernsteinCurve(problem.t_rep, s.duration, points.reshape(s.pieces, -1, 2))
     return curve, objective, dict(zip(_FAMILIES, worst.tolist(), strict=True))
 
 
