@@ -226,22 +226,11 @@ def _walls_along(
     ahead = s - upper > lower - s
     behind = across > ahead
     ahead &= across
-    smallest, largest = _nearest(lower, upper, behind, ahead)
-    return (
-        None if smallest is None else smallest.take(grid.index),
-        None if largest is None else largest.take(grid.index),
-    )
-
-
-def _nearest(
-    lower: Array, upper: Array, behind: npt.NDArray[np.bool_], ahead: npt.NDArray[np.bool_]
-) -> tuple[Array | None, Array | None]:
-    """Largest of the ``upper`` sides (N, ...) of boxes to stay ahead of, smallest of the ``lower`` ones."""
     smallest = largest = None
     if np.count_nonzero(ahead):
-        smallest = np.maximum.reduce(upper, where=ahead, initial=-np.inf)
+        smallest = np.maximum.reduce(upper, where=ahead, initial=-np.inf).take(grid.index)
     if np.count_nonzero(behind):
-        largest = np.minimum.reduce(lower, where=behind, initial=np.inf)
+        largest = np.minimum.reduce(lower, where=behind, initial=np.inf).take(grid.index)
     return smallest, largest
 
 
@@ -258,33 +247,33 @@ def _walls_around(
     changes sides within the piece, each time has its own.
     """
     lower, upper = _boxes(problem, grid)
-    present = np.isfinite(lower).all(axis=2)
-    if not np.count_nonzero(present):
-        return None, None
-    room = np.empty((4, *present.shape))
-    np.subtract(lower[..., 0], s, out=room[Side.BEHIND])
-    np.subtract(s, upper[..., 0], out=room[Side.AHEAD])
-    np.subtract(l, upper[..., 1], out=room[Side.LEFT])
-    np.subtract(lower[..., 1], l, out=room[Side.RIGHT])
-    np.copyto(room, np.inf, where=~present)
-    side = _sides(room.take(grid.index, axis=2))
-    present = present.take(grid.index, axis=1)
-    lower, upper = lower.take(grid.index, axis=1), upper.take(grid.index, axis=1)
-    behind, ahead, left, right = (present & (side == k) for k in range(4))  # in the order of Side
-    np.maximum.reduce(upper[..., 1], axis=(0, 2), where=left, initial=-np.inf, out=sideways[0])
-    np.minimum.reduce(lower[..., 1], axis=(0, 2), where=right, initial=np.inf, out=sideways[1])
-    return _nearest(lower[..., 0], upper[..., 0], behind, ahead)
+    # Times first, boxes last: reductions over times, and over the few sides, are then the fast ones.
+    room = np.empty((len(s), 4, len(lower)))
+    np.subtract(lower[..., 0].T, s[:, None], out=room[:, Side.BEHIND])
+    np.subtract(s[:, None], upper[..., 0].T, out=room[:, Side.AHEAD])
+    np.subtract(l[:, None], upper[..., 1].T, out=room[:, Side.LEFT])
+    np.subtract(lower[..., 1].T, l[:, None], out=room[:, Side.RIGHT])
+    np.fmin(room, np.inf, out=room)  # a box that is not there (NaN) leaves all of it
+    room = room.take(grid.index.T, axis=0)
+    chosen = _sides(room)[..., None, :] == np.arange(4)[:, None]
+    room = np.minimum.reduce(np.where(chosen, room, np.inf), axis=3, initial=np.inf)
+    behind, ahead, left, right = (room[..., k].T for k in range(4))  # in the order of Side
+    s, l = s.take(grid.index), l.take(grid.index)  # noqa: E741
+    np.maximum.reduce(l - left, axis=1, out=sideways[0])
+    np.minimum.reduce(l + right, axis=1, out=sideways[1])
+    bounds = np.isfinite(room).any(axis=(0, 1))
+    return s - ahead if bounds[Side.AHEAD] else None, s + behind if bounds[Side.BEHIND] else None
 
 
 def _sides(room: Array) -> npt.NDArray[np.intp]:
-    """Side of each obstacle, (N, M, L) or (N, M, 1), from the room (4, N, M, L) on each.
+    """Side of each obstacle, (M, N) or (L, M, N), from the room (L, M, 4, N) on each.
 
     The room is inf where the obstacle is not there.
     """
-    least = np.minimum.reduce(room, axis=3)
-    kept: npt.NDArray[np.intp] = least.argmax(axis=0)[..., None]
-    steady = np.maximum.reduce(least) >= -_TOLERANCE
-    return kept if steady.all() else np.where(steady[..., None], kept, room.argmax(axis=0))
+    least = np.minimum.reduce(room)
+    kept: npt.NDArray[np.intp] = least.argmax(axis=1)
+    steady = np.maximum.reduce(least, axis=1) >= -_TOLERANCE
+    return kept if steady.all() else np.where(steady, kept, room.argmax(axis=2))
 
 
 def _line_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
@@ -310,7 +299,7 @@ def _cut_to_road(problem: RepairProblem, s: Array, sideways: Array) -> None:
     """Cut the l intervals to the lateral room around the guide; the start always counts as inside."""
     start = float(problem.start[0, 1])
     right, left = problem.bounds.at(s + _AROUND)
-    narrow, wide = right.max(axis=(0, 2)), left.min(axis=(0, 2))
+    narrow, wide = np.maximum.reduce(right, axis=(0, 2)), np.minimum.reduce(left, axis=(0, 2))
     narrow[0], wide[0] = min(narrow[0], start), max(wide[0], start)
     np.maximum(sideways[0], narrow, out=sideways[0])
     np.minimum(sideways[1], wide, out=sideways[1])

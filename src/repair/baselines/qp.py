@@ -100,7 +100,7 @@ def solve_projection(
     """
     if time_limit is not None and time_limit <= 0.0:
         return QpAnswer(SolveStatus.TIME_LIMIT, None, np.inf, "no time left")
-    if np.minimum.reduce(upper, initial=0.0) >= 0.0 >= np.maximum.reduce(lower, initial=0.0):
+    if np.count_nonzero(upper >= 0.0) == len(upper) and np.count_nonzero(lower <= 0.0) == len(lower):
         return QpAnswer(SolveStatus.SOLVED, np.zeros(rows.shape[1]), 0.0, "no constraint is active")
     begin = time.perf_counter()
     # daqp reads on from the first number, whatever the strides are.

@@ -91,10 +91,7 @@ class _AxisQp:
     def broken(self, left: Array, name: str) -> str:
         """Which bound the start alone breaks, from the room ``left`` (2, B) to the bounds; "" if none."""
         left = left[:, self.free :]
-        if (
-            np.maximum.reduce(left[0], initial=0.0) <= _START
-            and np.minimum.reduce(left[1], initial=0.0) >= -_START
-        ):
+        if not np.count_nonzero(left[0] > _START) and not np.count_nonzero(left[1] < -_START):
             return ""
         excess = np.maximum(left[0], -left[1])
         family = np.searchsorted(self.families, self.bounded[self.free :], side="right") - 1
@@ -286,7 +283,9 @@ class QptrBackend:
         tasks[0, 3:] -= shift
         tasks[0, 0] = 0.0
         return [
-            _axis(qp, tasks[axis], corridor.control_bounds(c.degree, axis), 0.0 if axis else shift, "sl"[axis])
+            _axis(
+                qp, tasks[axis], corridor.control_bounds(c.degree, axis), 0.0 if axis else shift, "sl"[axis]
+            )
             for axis, qp in enumerate(qps)
         ], tasks
 
