@@ -91,11 +91,11 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     index = np.minimum(first[:, None] + np.arange((last - first).max() + 1), last[:, None])
     base, second = _candidates(index.shape[1])
     t = times[index]
-    span = np.hstack([t, t + t[:, -1:] - t[:, :1]])[:, second] - t[:, base]
+    start = t.take(base, axis=1)
+    span = np.hstack([t, t + t[:, -1:] - t[:, :1]]).take(second, axis=1) - start
     span[span <= 0.0] = np.nan
-    ratio = (t.T[:, :, None] - t[:, base]) / span
-    # In this order of memory: products and reductions are several times as fast as in that of the transpose.
-    ratio = np.ascontiguousarray(ratio)
+    # Times first in memory too: products and reductions are several times as fast as in that of t.T.
+    ratio = (np.ascontiguousarray(t.T)[:, :, None] - start) / span
     return TimeGrid(edges, frozen(times), index, base, second, frozen(ratio), *_steps(times, steps))
 
 
@@ -165,18 +165,17 @@ def build_corridor(problem: RepairProblem, grid: TimeGrid, reference: Array | No
     """
     if reference is None:
         reference = problem.reference.sample(grid.times).position
-    s, l = _guide(problem, grid, reference)  # noqa: E741
+    guide = _guide(problem, grid, reference)
     start = float(problem.start[0, 0])
     farthest = start + problem.limits.v_max * (problem.t_end - problem.t_rep) + 1.0
     pieces = len(grid.index)
     ends, sideways = np.empty((2, pieces, 2)), np.empty((2, pieces))
     ends[0], ends[1], sideways[0], sideways[1] = start - 1.0, farthest, -np.inf, np.inf
     if problem.lateral:
-        lower, upper = _walls_around(problem, grid, s, l, sideways)
+        lower, upper = _walls_around(problem, grid, guide, sideways)
     else:
-        lower, upper = _walls_along(problem, grid, s, l)
-    if lower is not None or upper is not None or problem.lateral:
-        s = s.take(grid.index)
+        lower, upper = _walls_along(problem, grid, guide)
+    s = guide[0].take(grid.index)
     if lower is not None:  # a lower bound is the upper bound of what is mirrored
         np.negative(_line_below(grid, -np.maximum(lower, start - 1.0), -s), out=ends[0])
     if upper is not None:
@@ -208,18 +207,15 @@ def _boxes(problem: RepairProblem, grid: TimeGrid) -> tuple[Array, Array]:
 
 
 def _walls_along(
-    problem: RepairProblem,
-    grid: TimeGrid,
-    s: Array,
-    l: Array,  # noqa: E741
+    problem: RepairProblem, grid: TimeGrid, guide: tuple[Array, Array]
 ) -> tuple[Array | None, Array | None]:
-    """Smallest and largest s (M, L) where l (U,) is given; None where no box bounds it.
+    """Smallest and largest s (M, L) where the guide's l is given; None where no box bounds it.
 
     A box beside the path is no matter, and the others can only be passed along s. The rooms behind
     and ahead of one add up to minus its length, so a guide that keeps one of these sides over a piece
     has more room there at each time: the sides of a piece are those of its times.
     """
-    lower, upper = _boxes(problem, grid)
+    (s, l), (lower, upper) = guide, _boxes(problem, grid)  # noqa: E741
     across = lower[..., 1] < l
     across &= l < upper[..., 1]
     lower, upper = lower[..., 0], upper[..., 0]
@@ -235,18 +231,14 @@ def _walls_along(
 
 
 def _walls_around(
-    problem: RepairProblem,
-    grid: TimeGrid,
-    s: Array,
-    l: Array,  # noqa: E741
-    sideways: Array,
+    problem: RepairProblem, grid: TimeGrid, guide: tuple[Array, Array], sideways: Array
 ) -> tuple[Array | None, Array | None]:
     """Smallest and largest s (M, L) as above, where boxes can be passed sideways too: ``sideways`` (2, M).
 
     Over a piece an obstacle is kept on that side which the guide keeps all the time; where the guide
     changes sides within the piece, each time has its own.
     """
-    lower, upper = _boxes(problem, grid)
+    (s, l), (lower, upper) = guide, _boxes(problem, grid)  # noqa: E741
     # Times first, boxes last: reductions over times, and over the few sides, are then the fast ones.
     room = np.empty((len(s), 4, len(lower)))
     np.subtract(lower[..., 0].T, s[:, None], out=room[:, Side.BEHIND])
@@ -311,8 +303,8 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
     if problem.lateral and (corridor.l[0] > corridor.l[1] + _TOLERANCE).any():
         i = int(np.argmax(corridor.l[0] - corridor.l[1]))
         raise NoCorridor(f"no room sideways between t = {edges[i]:.2f} s and {edges[i + 1]:.2f} s")
-    low, high = _at_edges(corridor.s[..., 0], corridor.s[..., 1])
-    right, left = _at_edges(corridor.l, corridor.l) if problem.lateral else (low, high)
+    low, high = _at_edges(corridor.s)
+    right, left = _at_edges(np.repeat(corridor.l[..., None], 2, axis=2)) if problem.lateral else (low, high)
     if not low[0] - _TOLERANCE <= start[0] <= high[0] + _TOLERANCE:
         raise NoCorridor(f"the start lies {start[0] - high[0]:.2f} m beyond the first trapezoid")
     if problem.lateral and not right[0] - _TOLERANCE <= start[1] <= left[0] + _TOLERANCE:
@@ -335,16 +327,19 @@ def _require_open(problem: RepairProblem, corridor: Corridor) -> None:
         )
 
 
-def _at_edges(first: Array, last: Array) -> Array:
-    """Lower and upper bounds (2, M + 1) at the edges from those (2, M) at both ends of the pieces.
+@lru_cache(maxsize=64)
+def _edges(pieces: int) -> npt.NDArray[np.intp]:
+    """Where in a row of the pieces' starts and ends each edge begins."""
+    return np.concatenate([[0], np.arange(1, 2 * pieces, 2)])
+
+
+def _at_edges(bounds: Array) -> tuple[Array, Array]:
+    """Lower and upper bound (M + 1,) at the edges from those (2, M, 2) at both ends of the pieces.
 
     Two neighbours share their joint's control point, so both must have room for it.
     """
-    bounds = np.empty((2, first.shape[1] + 1))
-    bounds[:, 0], bounds[:, -1] = first[:, 0], last[:, -1]
-    np.maximum(last[0, :-1], first[0, 1:], out=bounds[0, 1:-1])
-    np.minimum(last[1, :-1], first[1, 1:], out=bounds[1, 1:-1])
-    return bounds
+    (lower, upper), edges = bounds.reshape(2, -1), _edges(bounds.shape[1])
+    return np.maximum.reduceat(lower, edges), np.minimum.reduceat(upper, edges)
 
 
 def _least_progress(problem: RepairProblem, edges: Array) -> Array:

@@ -271,8 +271,7 @@ def _proven_violation(rows: Array, lower: Array, upper: Array) -> float:
     if flag <= 0 or not 0.0 < total < np.inf:  # NaN is neither
         return 0.0
     combination, allowed = _combined(rows, lower, upper, y)
-    found = (-allowed - _FAR * math.sqrt(combination @ combination)) / total
-    return max(found, 0.0)
+    return max(-allowed - _FAR * math.sqrt(combination @ combination), 0.0) / total
 
 
 def infeasibility(rows: Array, lower: Array, upper: Array) -> float:
