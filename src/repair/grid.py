@@ -7,13 +7,14 @@ same tables; only what depends on the state at t_rep is left to be computed.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from repair.passing import Surroundings, inside, overlapping
+from repair.passing import Surroundings, blocks, inside
 from repair.types import Array, FrenetTrajectory, frozen
 
 if TYPE_CHECKING:
@@ -32,7 +33,9 @@ class Grid:
     Attributes
     ----------
     occupancy : Occupancy
-        All obstacles; its first steps are those of the grid.
+        The obstacles; its first steps are those of the grid.
+    swept : (4, N, K) array
+        What the boxes span from each step to the next.
     step : float
         Time between two steps [s].
     last : int
@@ -48,6 +51,7 @@ class Grid:
     """
 
     occupancy: Occupancy
+    swept: Array
     step: float
     last: int
     states: Array
@@ -55,7 +59,7 @@ class Grid:
     hits: list[tuple[int, int]]
     rightmost: list[float]
     leftmost: list[float]
-    _overlaps: dict[float, npt.NDArray[np.bool_]] = field(default_factory=dict)
+    _blocks: dict[float, Array] = field(default_factory=dict)
 
     @classmethod
     def over(cls, occupancy: Occupancy, reference: Curve, t_end: float, step: float) -> Grid | None:
@@ -73,6 +77,7 @@ class Grid:
         sideways = columns[0, ::-1, 1]
         return cls(
             occupancy,
+            occupancy.swept[:, :, :last],
             step,
             last,
             frozen(columns[:3].transpose(1, 0, 2)),
@@ -104,15 +109,15 @@ class Grid:
         """
         steps = slice(first, self.last + 1)
         among = rows.tolist()
-        conflict = next(
-            ((k - first, among.index(j)) for k, j in self.hits if k >= first and j in among), None
-        )
-        overlap = self._overlap(margin)[:, steps].take(rows, axis=0)
-        return Surroundings(near.lower[:, steps], near.upper[:, steps], conflict, overlap)
+        # The hits are in the order of their steps.
+        ahead = self.hits[bisect_left(self.hits, (first, 0)) :]
+        conflict = next(((k - first, among.index(j)) for k, j in ahead if j in among), None)
+        rear, front = self._blocking(margin).take(rows, axis=1)[..., first:]
+        return Surroundings(near.lower[:, steps], near.upper[:, steps], conflict, (rear, front))
 
-    def _overlap(self, margin: float) -> npt.NDArray[np.bool_]:
-        """Which boxes (N, K + 1) the reference overlaps sideways."""
-        if margin not in self._overlaps:
+    def _blocking(self, margin: float) -> Array:
+        """Rear and front ends (2, N, K + 1) of the boxes where the reference overlaps them sideways."""
+        if margin not in self._blocks:
             lower, upper = self.occupancy.lower[:, : self.last + 1], self.occupancy.upper[:, : self.last + 1]
-            self._overlaps[margin] = overlapping(lower - margin, upper + margin, self.columns[0, :, 1])
-        return self._overlaps[margin]
+            self._blocks[margin] = frozen(blocks(lower - margin, upper + margin, self.columns[0, :, 1]))
+        return self._blocks[margin]

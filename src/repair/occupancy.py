@@ -165,7 +165,7 @@ def relevant(
     first = max(int(occupancy.t.searchsorted(t_start + 1e-9, side="right")) - 1, 0)
     last = min(int(occupancy.t.searchsorted(t_end - 1e-9, side="left")), last_step)
     if last > first:
-        kept = near(occupancy, slice(first, last), reach, l_room)
+        kept = near(occupancy.swept[:, :, first:last], reach, l_room)
     else:  # a single step, at which the boxes are what they are
         lower, upper = occupancy.lower[:, first], occupancy.upper[:, first]
         smallest, largest = np.array([reach, l_room]).T
@@ -174,12 +174,15 @@ def relevant(
 
 
 def near(
-    occupancy: Occupancy, steps: slice, reach: Sequence[float] | Array, l_room: Sequence[float] | Array
+    swept: Array, reach: Sequence[float] | Array, l_room: Sequence[float] | Array
 ) -> npt.NDArray[np.bool_]:
     """Which obstacles (N,) are within reach and room in one of the steps (between two steps of the scenario).
 
-    Between two steps a box stays within what both of them span.
+    Parameters
+    ----------
+    swept : (4, N, K) array
+        What the boxes span in each of them, as ``Occupancy.swept`` has it.
     """
     bound = np.array([reach[0], -reach[1], l_room[0], -l_room[1]])[:, None, None]
-    within = np.logical_and.reduce(occupancy.swept[:, :, steps] > bound, axis=0)
+    within = np.logical_and.reduce(swept > bound, axis=0)
     return np.asarray(np.logical_or.reduce(within, axis=1))

@@ -11,7 +11,7 @@ limits; it shows that a way is open, and a backend makes a trajectory of it.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from repair.types import (
     frozen,
 )
 
-__all__ = ["Surroundings", "inside", "open_passings", "overlapping", "sides_of", "surroundings"]
+__all__ = ["Surroundings", "blocks", "inside", "open_passings", "sides_of", "surroundings"]
 
 # Shares of the acceleration limits, and of the start speed, that are rolled out.
 _BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
@@ -38,6 +38,9 @@ _DELAYS = (0.0, 1.5, 3.0)
 _HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
 # The cost of a way that is not open starts here, far above those of open ones.
 _SHUT = 1e3
+# Share of the friction circle and of the lateral limit that a guide may use: a tenth of both is left
+# to what a backend makes of it.
+_GUIDED = 0.9
 
 
 class _Family(NamedTuple):
@@ -53,6 +56,7 @@ class _Family(NamedTuple):
     half: Array  # (K, P), half of the rate: arrays of one shape are multiplied twice as fast
     since: Array  # (K, P), the time since the change began, 0 before it
     begun: Array  # (K, P), the same, but inf before it
+    harsh: npt.NDArray[np.bool_]  # (P,), the change alone is more than a guide may ask of the tyres
     slowest: int
     fastest: int
 
@@ -81,7 +85,7 @@ class _Rollouts(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _family(a_min: float, a_max: float, count: int, step: float) -> _Family:
+def _family(a_min: float, a_max: float, a_total: float, count: int, step: float) -> _Family:
     """All profiles over ``count`` samples, ``step`` apart."""
     tau = step * np.arange(count)
     family = [(0.0, 1.0, 1.0, 0.0)]  # to the speed that it has: no change
@@ -96,6 +100,9 @@ def _family(a_min: float, a_max: float, count: int, step: float) -> _Family:
     hardest = (0.0, _THROTTLE[-1] * a_max, 1.0, _GAINS[-1])
     delay, rate, share, gain = (frozen(column) for column in np.array(family).T)
     since = tau[:, None] - delay
+    # Who begins on a sample shows the acceleration there, or else changes nothing.
+    harsh = (np.abs(rate) > _GUIDED * a_total) & (since == 0.0).any(axis=0)
+    harsh.setflags(write=False)
     return _Family(
         rate,
         share,
@@ -104,6 +111,7 @@ def _family(a_min: float, a_max: float, count: int, step: float) -> _Family:
         half=frozen(np.broadcast_to(0.5 * rate, since.shape)),
         since=frozen(np.maximum(since, 0.0)),
         begun=frozen(np.where(since >= 0.0, since, np.inf)),
+        harsh=harsh,
         slowest=family.index((0.0, _BRAKING[-1] * a_min, _HOLD[0], 0.0)),
         fastest=family.index(hardest) if hardest in family else 0,
     )
@@ -113,7 +121,8 @@ def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
     count, duration = len(tau), max(float(tau[-1]), 1e-9)
-    family = _family(limits.a_min, limits.a_max, count, round(duration / max(count - 1, 1), 9))
+    step = round(duration / max(count - 1, 1), 9)
+    family = _family(limits.a_min, limits.a_max, limits.a_total, count, step)
     rise = np.minimum(family.share * v0 + family.gain, max(limits.v_max, v0)) - v0
     change = rise / family.rate
     ramp = np.minimum(family.since, change)
@@ -138,7 +147,7 @@ class _LateralProfile(NamedTuple):
     maneuver: Maneuver | None  # None: keeps the path; yield or go ahead is decided by the speed
     l: Array  # noqa: E741
     rate: Array
-    acceleration: Array
+    acceleration: Array | float
     cost: float
 
 
@@ -168,23 +177,22 @@ class Surroundings(NamedTuple):
         Corners of the boxes; NaN where an obstacle is absent.
     conflict : (k, j) or None
         First time index, and obstacle, at which the reference is inside of a box.
-    overlap : (N, K) bool array
-        Which boxes, the margin added, the reference overlaps sideways.
+    blocks : pair of (N, K) arrays
+        What :func:`blocks` says of the reference's lateral motion.
     """
 
     lower: Array
     upper: Array
     conflict: tuple[int, int] | None
-    overlap: npt.NDArray[np.bool_]
+    blocks: tuple[Array, Array]
 
 
 def surroundings(reference: FrenetTrajectory, occupancy: Occupancy, margin: float) -> Surroundings:
     """Look them up at the reference's times, whatever these are."""
     lower, upper = occupancy.at(reference.t)
     conflict = _conflict(inside(lower, upper, reference.position))
-    return Surroundings(
-        lower, upper, conflict, overlapping(lower - margin, upper + margin, reference.position[:, 1])
-    )
+    ends = blocks(lower - margin, upper + margin, reference.position[:, 1])
+    return Surroundings(lower, upper, conflict, ends)
 
 
 def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
@@ -193,9 +201,13 @@ def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
     return within[..., 0] & within[..., 1]
 
 
-def overlapping(lower: Array, upper: Array, l: Array) -> npt.NDArray[np.bool_]:  # noqa: E741
-    """Which boxes (N, K) the lateral motion l (K,) overlaps sideways."""
-    return (lower[..., 1] < l) & (l < upper[..., 1])
+def blocks(lower: Array, upper: Array, l: Array) -> tuple[Array, Array]:  # noqa: E741
+    """Rear and front end (N, K) of the boxes that a lateral motion l (K,) overlaps sideways.
+
+    The rear of those that it does not overlap is infinitely far away: nobody enters them.
+    """
+    overlap = (lower[..., 1] < l) & (l < upper[..., 1])
+    return np.where(overlap, lower[..., 0], np.inf), upper[..., 0]
 
 
 def _conflict(hit: npt.NDArray[np.bool_]) -> tuple[int, int] | None:
@@ -211,20 +223,17 @@ def _lateral_profiles(
     start: Array,
     tau: Array,
     reference: FrenetTrajectory,
-    lower: Array,
-    upper: Array,
-    conflict: tuple[int, int] | None,
+    boxes: Surroundings,
     limits: Limits,
     bounds: LateralBounds,
     margin: float,
     lateral: bool,
 ) -> list[_LateralProfile]:
-    zero = np.zeros(len(tau))
-    keep = _LateralProfile(None, reference.position[:, 1], reference.velocity[:, 1], zero, 0.0)
+    keep = _LateralProfile(None, reference.position[:, 1], reference.velocity[:, 1], 0.0, 0.0)
     profiles = [keep]
-    if not lateral or conflict is None:
+    if not lateral or boxes.conflict is None:
         return profiles
-    k, j = conflict
+    lower, upper, (k, j) = boxes.lower, boxes.upper, boxes.conflict
     s = reference.position[:, 0]
     room = 5.0 + 0.5 * max(float(start[1, 0]), 0.0)
     beside = (lower[j, :, 0] - room < s) & (s < upper[j, :, 0] + room)
@@ -291,32 +300,31 @@ def open_passings(
         boxes are wider than the vehicles, so it is for the checker to say that they fail.
     """
     tau = reference.t - reference.t[0]
-    lower, upper, conflict, overlap = boxes or surroundings(reference, occupancy, margin)
-    profiles = _lateral_profiles(
-        start, tau, reference, lower, upper, conflict, limits, bounds, margin + 0.05, lateral
-    )
+    boxes = boxes or surroundings(reference, occupancy, margin)
+    profiles = _lateral_profiles(start, tau, reference, boxes, limits, bounds, margin + 0.05, lateral)
     speeds = _speed_profiles(start, tau, limits)
-    wide_lower, wide_upper = lower - margin, upper + margin
+    if len(profiles) > 1:
+        wide_lower, wide_upper = boxes.lower - margin, boxes.upper + margin
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
-    shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]] = []
+    shut: list[_Shut] = []
     for profile in profiles:
-        if profile.maneuver is not None:
-            overlap = overlapping(wide_lower, wide_upper, profile.l)
-        free = ~_entered(speeds, overlap, wide_lower[..., 0], wide_upper[..., 0])
-        for maneuver, members in _kinds(profile, conflict, overlap, wide_upper, speeds):
-            p = _gentlest(speeds, free & members, limits, curvature)
+        keeps = profile.maneuver is None
+        rear, front = boxes.blocks if keeps else blocks(wide_lower, wide_upper, profile.l)
+        meetings = _meetings(speeds, rear, front)
+        entered = _entered(meetings)
+        for maneuver, others in _kinds(profile, boxes.conflict, rear, front, speeds):
+            p = _gentlest(speeds, entered if others is None else entered | others, limits, curvature)
             if p is not None:
                 cost = float(speeds.cost[p]) + profile.cost
                 if maneuver not in best or cost < best[maneuver][0]:
                     best[maneuver] = (cost, p, profile)
-            elif members.any():
-                shut.append((profile, maneuver, members))
+            elif others is None or not others.all():
+                shut.append(_Shut(profile, maneuver, others, meetings))
     if Maneuver.YIELD not in best and Maneuver.GO_AHEAD not in best:
         wanted: list[Maneuver | None] = [None] if best else [None, Maneuver.LEFT, Maneuver.RIGHT]
-        excess = _excess(speeds.motion(slice(None)), limits, curvature)
-        best |= _closest(speeds, shut, wanted, excess, wide_lower, wide_upper)
+        best |= _closest(speeds, shut, wanted, limits, curvature)
     passings = [
-        _passing(maneuver, cost, speeds, p, profile, reference.t, lower, upper)
+        _passing(maneuver, cost, speeds, p, profile, reference.t, boxes)
         for maneuver, (cost, p, profile) in best.items()
     ]
     return tuple(sorted(passings, key=lambda x: x.cost))
@@ -328,11 +336,6 @@ def _demand(motion: tuple[Array, Array, Array], curvature: tuple[Array, Array]) 
     bend = np.abs(np.interp(s, *curvature)) * (v * v)
     total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))
     return total, np.maximum.reduce(bend, axis=0)
-
-
-# Share of the friction circle and of the lateral limit that a guide may use: a tenth of both is left
-# to what a backend makes of it.
-_GUIDED = 0.9
 
 
 def _allowed(
@@ -367,51 +370,73 @@ def _excess(motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple
 
 
 def _gentlest(
-    speeds: _Rollouts, free: npt.NDArray[np.bool_], limits: Limits, curvature: tuple[Array, Array]
+    speeds: _Rollouts, barred: npt.NDArray[np.bool_], limits: Limits, curvature: tuple[Array, Array]
 ) -> int | None:
-    """The cheapest of the ``free`` speed profiles (P,) that the bends allow."""
-    candidates = free.nonzero()[0]
-    if not len(candidates):
+    """The cheapest of the speed profiles (P,) that are not ``barred`` and that the bends allow."""
+    cost = np.where(barred | speeds.family.harsh, np.inf, speeds.cost)
+    first = int(cost.argmin())
+    if cost[first] == np.inf:
         return None
     # The cheapest is nearly always allowed; looking at all of them takes a hundred times as many numbers.
-    first = int(candidates[speeds.cost[candidates].argmin()])
     if _surely_allowed(speeds, first, limits, curvature) or _allowed(speeds.motion(first), limits, curvature):
         return first
+    candidates = (cost < np.inf).nonzero()[0]
     candidates = candidates[_allowed(speeds.motion(candidates), limits, curvature)]
     return int(candidates[speeds.cost[candidates].argmin()]) if len(candidates) else None
 
 
-def _entered(
-    speeds: _Rollouts, overlap: npt.NDArray[np.bool_], lower: Array, upper: Array
-) -> npt.NDArray[np.bool_]:
-    """Which speed profiles (P,) enter a box (N, K) at a time at which they overlap it sideways."""
-    met = (overlap & (lower < speeds.most) & (upper > speeds.least)).nonzero()
-    s = speeds.s.take(met[1], axis=0)
-    within = s > lower[met][:, None]
-    within &= s < upper[met][:, None]
+# Positions of all profiles (M, P), and the rear and front ends of the boxes (M, 1), wherever some
+# profile may be in a box.
+_Meetings = tuple[Array, Array, Array]
+
+
+def _meetings(speeds: _Rollouts, rear: Array, front: Array) -> _Meetings:
+    """Where the speed profiles come upon the boxes' ends (N, K)."""
+    met = rear < speeds.most
+    met &= front > speeds.least
+    return speeds.s.take(met.nonzero()[1], axis=0), rear[met][:, None], front[met][:, None]
+
+
+def _entered(meetings: _Meetings) -> npt.NDArray[np.bool_]:
+    """Which speed profiles (P,) enter a box."""
+    s, rear, front = meetings
+    within = s > rear
+    within &= s < front
     return np.asarray(np.logical_or.reduce(within, axis=0))
+
+
+def _depth(meetings: _Meetings) -> Array:
+    """How deep each speed profile (P,) gets into a box."""
+    s, rear, front = meetings
+    return np.asarray(np.maximum.reduce(np.minimum(s - rear, front - s), axis=0, initial=0.0))
+
+
+class _Shut(NamedTuple):
+    """A manoeuvre that is not open: its lateral motion, the speed profiles that are others, the boxes met."""
+
+    profile: _LateralProfile
+    maneuver: Maneuver
+    others: npt.NDArray[np.bool_] | None
+    meetings: _Meetings
 
 
 def _closest(
     speeds: _Rollouts,
-    shut: list[tuple[_LateralProfile, Maneuver, npt.NDArray[np.bool_]]],
+    shut: list[_Shut],
     wanted: list[Maneuver | None],
-    excess: Array,
-    lower: Array,
-    upper: Array,
+    limits: Limits,
+    curvature: tuple[Array, Array],
 ) -> dict[Maneuver, tuple[float, int, _LateralProfile]]:
     """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
+    excess = _excess(speeds.motion(slice(None)), limits, curvature)
     closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
-    for profile, maneuver, members in shut:
+    for profile, maneuver, others, meetings in shut:
         if profile.maneuver not in wanted:
             continue
-        overlap = overlapping(lower, upper, profile.l)
-        met = overlap.any(axis=1)
-        s = speeds.s.T[:, None]
-        within = np.minimum(s - lower[met, :, 0], upper[met, :, 0] - s)
-        depth = np.where(overlap[met], within, 0.0).max(axis=(1, 2), initial=0.0)
-        badness = np.where(members, 10.0 * depth + excess, np.inf)
-        p = int(np.argmin(badness))
+        badness = 10.0 * _depth(meetings) + excess
+        if others is not None:
+            badness[others] = np.inf
+        p = int(badness.argmin())
         if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
             closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
     found = (closest[kind] for kind in wanted if kind in closest)
@@ -421,18 +446,23 @@ def _closest(
 def _kinds(
     profile: _LateralProfile,
     conflict: tuple[int, int] | None,
-    overlap: npt.NDArray[np.bool_],
-    upper: Array,
+    rear: Array,
+    front: Array,
     speeds: _Rollouts,
-) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_]], ...]:
-    """Which speed profiles (P,) count as which manoeuvre."""
-    if profile.maneuver is None and conflict is not None:
-        k = overlap[conflict[1]].nonzero()[0]
-        if len(k):
-            beyond = speeds.s.take(k, axis=0) > upper[conflict[1], k, 0][:, None]
-            passed = np.logical_or.reduce(beyond, axis=0)
-            return (Maneuver.YIELD, ~passed), (Maneuver.GO_AHEAD, passed)
-    return ((profile.maneuver or Maneuver.YIELD, np.ones(len(speeds.cost), dtype=bool)),)
+) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_] | None], ...]:
+    """The manoeuvres that a lateral motion may be part of, each with the speed profiles (P,) that are others."""
+    if profile.maneuver is not None:
+        return ((profile.maneuver, None),)
+    if conflict is None:
+        return ((Maneuver.YIELD, None),)
+    # Where not even the fastest gets past the obstacle in conflict, all of them yield.
+    rear, front = rear[conflict[1]], front[conflict[1]]
+    passed = (speeds.most > front) & (rear < np.inf)
+    if not np.logical_or.reduce(passed):
+        return ((Maneuver.YIELD, None),)
+    k = passed.nonzero()[0]
+    others = np.logical_or.reduce(speeds.s.take(k, axis=0) > front[k][:, None], axis=0)
+    return (Maneuver.YIELD, others), (Maneuver.GO_AHEAD, ~others)
 
 
 def _passing(
@@ -442,15 +472,15 @@ def _passing(
     p: int,
     profile: _LateralProfile,
     times: Array,
-    lower: Array,
-    upper: Array,
+    boxes: Surroundings,
 ) -> Passing:
     columns = np.zeros((4, len(times), 2))
     columns[0, :, 0], columns[1, :, 0], columns[2, :, 0] = speeds.motion(p)
     columns[0, :, 1], columns[1, :, 1], columns[2, :, 1] = profile.l, profile.rate, profile.acceleration
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
-    return Passing(maneuver, guide, sides_of(guide.position, lower, upper), cost, cost < _SHUT)
+    sides = partial(sides_of, guide.position, boxes.lower, boxes.upper)
+    return Passing.found(maneuver, guide, sides, cost, cost < _SHUT)
 
 
 def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8]:
@@ -463,7 +493,5 @@ def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8
     far = np.maximum(before, after)
     along, across = far[..., 0], far[..., 1]
     ahead, left = after[..., 0] > before[..., 0], after[..., 1] >= before[..., 1]
-    # in the order of Side: behind, ahead, left, right
-    side = np.where(across > along, 3 - left.view(np.int8), ahead.view(np.int8))
-    side *= np.isfinite(along + across)  # to BEHIND, which is 0
-    return side
+    # In the order of Side: behind, ahead, left, right. Nothing is true of a box that is not there.
+    return np.where(across > along, 3 - left.view(np.int8), ahead.view(np.int8))

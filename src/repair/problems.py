@@ -174,8 +174,8 @@ class ProblemFactory:
             return reference, start, occupancy, surroundings(reference, occupancy, margin)
         reference, start = grid.trajectory(first, times), grid.states[first]
         reach, room = self._reach(start, t_rep, grid.rightmost[first], grid.leftmost[first], lateral)
-        rows = near(self.occupancy, slice(first, grid.last), reach, room).nonzero()[0]
-        occupancy = self.occupancy.select(rows) if len(rows) < len(self.occupancy) else self.occupancy
+        rows = near(grid.swept[..., first:], reach, room).nonzero()[0]
+        occupancy = grid.occupancy.select(rows) if len(rows) < len(grid.occupancy) else grid.occupancy
         return reference, start, occupancy, grid.surroundings(first, rows, occupancy, margin)
 
     def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:

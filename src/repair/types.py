@@ -6,11 +6,11 @@ SI units throughout, float64, arrays read-only. ``N`` obstacles, ``T`` time step
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property, lru_cache
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -280,6 +280,28 @@ class Passing:
     side: npt.NDArray[np.int8]
     cost: float
     open: bool = True
+
+    @classmethod
+    def found(
+        cls,
+        maneuver: Maneuver,
+        guide: FrenetTrajectory,
+        sides: Callable[[], npt.NDArray[np.int8]],
+        cost: float,
+        open: bool = True,
+    ) -> Passing:
+        """One whose ``side`` is made by ``sides`` when it is asked for: most backends take the guide alone."""
+        passing = cls.__new__(cls)
+        passing.__dict__.update(maneuver=maneuver, guide=guide, cost=cost, open=open, _sides=sides)
+        return passing
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):
+            """The sides, the first time; whatever is known is found without coming here."""
+            if name != "side" or "_sides" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            return self.__dict__.setdefault("side", self._sides())
 
     def side_at(self, times: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """Side of every obstacle (N, K') at ``times``: that of the nearest guide time."""
