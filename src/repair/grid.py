@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from repair.passing import Surroundings, blocks, inside
+from repair.passing import Surroundings, blocking, inside
 from repair.types import Array, FrenetTrajectory, frozen
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Grid:
     hits: list[tuple[int, int]]
     rightmost: list[float]
     leftmost: list[float]
-    _blocks: dict[float, Array] = field(default_factory=dict)
+    _ends: dict[float, Array] = field(default_factory=dict)
 
     @classmethod
     def over(cls, occupancy: Occupancy, reference: Curve, t_end: float, step: float) -> Grid | None:
@@ -112,12 +112,12 @@ class Grid:
         # The hits are in the order of their steps.
         ahead = self.hits[bisect_left(self.hits, (first, 0)) :]
         conflict = next(((k - first, among.index(j)) for k, j in ahead if j in among), None)
-        rear, front = self._blocking(margin).take(rows, axis=1)[..., first:]
-        return Surroundings(near.lower[:, steps], near.upper[:, steps], conflict, (rear, front))
+        ends = self._blocking(margin).take(rows, axis=1)[..., first:]
+        return Surroundings(near.lower[:, steps], near.upper[:, steps], conflict, ends)
 
     def _blocking(self, margin: float) -> Array:
-        """Rear and front ends (2, N, K + 1) of the boxes where the reference overlaps them sideways."""
-        if margin not in self._blocks:
+        """Rear and front ends (2, N, K + 1) of all boxes (:func:`repair.passing.blocking`)."""
+        if margin not in self._ends:
             lower, upper = self.occupancy.lower[:, : self.last + 1], self.occupancy.upper[:, : self.last + 1]
-            self._blocks[margin] = frozen(blocks(lower - margin, upper + margin, self.columns[0, :, 1]))
-        return self._blocks[margin]
+            self._ends[margin] = blocking(lower - margin, upper + margin, self.columns[0, :, 1])
+        return self._ends[margin]

@@ -28,7 +28,7 @@ from repair.types import (
     frozen,
 )
 
-__all__ = ["Surroundings", "blocks", "inside", "open_passings", "sides_of", "surroundings"]
+__all__ = ["Surroundings", "blocking", "inside", "open_passings", "sides_of", "surroundings"]
 
 # Shares of the acceleration limits, and of the start speed, that are rolled out.
 _BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
@@ -52,7 +52,7 @@ class _Family(NamedTuple):
     rate: Array  # (P,), as are share and gain
     share: Array
     gain: Array
-    square: Array  # of the rate
+    weight: Array  # what a sample with this rate adds to the mean square of the acceleration
     half: Array  # (K, P), half of the rate: arrays of one shape are multiplied twice as fast
     since: Array  # (K, P), the time since the change began, 0 before it
     begun: Array  # (K, P), the same, but inf before it
@@ -107,7 +107,7 @@ def _family(a_min: float, a_max: float, a_total: float, count: int, step: float)
         rate,
         share,
         gain,
-        square=frozen(rate**2),
+        weight=frozen(rate**2 / count),
         half=frozen(np.broadcast_to(0.5 * rate, since.shape)),
         since=frozen(np.maximum(since, 0.0)),
         begun=frozen(np.where(since >= 0.0, since, np.inf)),
@@ -133,10 +133,11 @@ def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
     s += rise * family.since
     s += (s0 + v0 * tau)[:, None]
     # mean square of the acceleration, and the way that is lost
-    last = s[-1]
-    loss = (last[0] - last) / max(duration, 1.0)
-    changing = np.add.reduce(family.begun < change, axis=0)
-    cost = family.square * (changing / count) + 0.01 * (loss * loss)
+    cost = family.weight * np.add.reduce(family.begun < change, axis=0)
+    lost = s[-1] - s[-1, 0]
+    lost *= lost
+    lost *= 0.01 / max(duration, 1.0) ** 2
+    cost += lost
     # Who brakes hardest and to a stop is behind all others at any time, who accelerates hardest ahead.
     return _Rollouts(family, v0, s, ramp, change, cost, least=s[:, family.slowest], most=s[:, family.fastest])
 
@@ -177,22 +178,23 @@ class Surroundings(NamedTuple):
         Corners of the boxes; NaN where an obstacle is absent.
     conflict : (k, j) or None
         First time index, and obstacle, at which the reference is inside of a box.
-    blocks : pair of (N, K) arrays
-        What :func:`blocks` says of the reference's lateral motion.
+    ends : (2, N, K) array
+        Rear and front ends that :func:`blocking` says of the reference's lateral motion.
     """
 
     lower: Array
     upper: Array
     conflict: tuple[int, int] | None
-    blocks: tuple[Array, Array]
+    ends: Array
 
 
 def surroundings(reference: FrenetTrajectory, occupancy: Occupancy, margin: float) -> Surroundings:
     """Look them up at the reference's times, whatever these are."""
     lower, upper = occupancy.at(reference.t)
     conflict = _conflict(inside(lower, upper, reference.position))
-    ends = blocks(lower - margin, upper + margin, reference.position[:, 1])
-    return Surroundings(lower, upper, conflict, ends)
+    return Surroundings(
+        lower, upper, conflict, blocking(lower - margin, upper + margin, reference.position[:, 1])
+    )
 
 
 def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
@@ -201,13 +203,13 @@ def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
     return within[..., 0] & within[..., 1]
 
 
-def blocks(lower: Array, upper: Array, l: Array) -> tuple[Array, Array]:  # noqa: E741
-    """Rear and front end (N, K) of the boxes that a lateral motion l (K,) overlaps sideways.
+def blocking(lower: Array, upper: Array, l: Array) -> Array:  # noqa: E741
+    """Rear and front ends (2, N, K) of the boxes, as a lateral motion l (K,) meets them.
 
-    The rear of those that it does not overlap is infinitely far away: nobody enters them.
+    Those that it does not overlap sideways begin infinitely far away: nobody enters them.
     """
     overlap = (lower[..., 1] < l) & (l < upper[..., 1])
-    return np.where(overlap, lower[..., 0], np.inf), upper[..., 0]
+    return np.array([np.where(overlap, lower[..., 0], np.inf), upper[..., 0]])
 
 
 def _conflict(hit: npt.NDArray[np.bool_]) -> tuple[int, int] | None:
@@ -308,16 +310,16 @@ def open_passings(
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
     shut: list[_Shut] = []
     for profile in profiles:
-        keeps = profile.maneuver is None
-        rear, front = boxes.blocks if keeps else blocks(wide_lower, wide_upper, profile.l)
-        meetings = _meetings(speeds, rear, front)
-        entered = _entered(meetings)
-        for maneuver, others in _kinds(profile, boxes.conflict, rear, front, speeds):
-            p = _gentlest(speeds, entered if others is None else entered | others, limits, curvature)
+        ends = boxes.ends if profile.maneuver is None else blocking(wide_lower, wide_upper, profile.l)
+        meetings = _meetings(speeds, ends)
+        # What a guide must not do has no cost; nor has what counts as another manoeuvre.
+        cost = np.where(_entered(meetings) | speeds.family.harsh, np.inf, speeds.cost)
+        for maneuver, others in _kinds(profile, boxes.conflict, ends, speeds):
+            p = _gentlest(speeds, cost if others is None else np.where(others, np.inf, cost), limits, curvature)
             if p is not None:
-                cost = float(speeds.cost[p]) + profile.cost
-                if maneuver not in best or cost < best[maneuver][0]:
-                    best[maneuver] = (cost, p, profile)
+                total = float(cost[p]) + profile.cost
+                if maneuver not in best or total < best[maneuver][0]:
+                    best[maneuver] = (total, p, profile)
             elif others is None or not others.all():
                 shut.append(_Shut(profile, maneuver, others, meetings))
     if Maneuver.YIELD not in best and Maneuver.GO_AHEAD not in best:
@@ -370,10 +372,9 @@ def _excess(motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple
 
 
 def _gentlest(
-    speeds: _Rollouts, barred: npt.NDArray[np.bool_], limits: Limits, curvature: tuple[Array, Array]
+    speeds: _Rollouts, cost: Array, limits: Limits, curvature: tuple[Array, Array]
 ) -> int | None:
-    """The cheapest of the speed profiles (P,) that are not ``barred`` and that the bends allow."""
-    cost = np.where(barred | speeds.family.harsh, np.inf, speeds.cost)
+    """The cheapest of the speed profiles (P,) of finite ``cost`` that the bends allow."""
     first = int(cost.argmin())
     if cost[first] == np.inf:
         return None
@@ -382,7 +383,7 @@ def _gentlest(
         return first
     candidates = (cost < np.inf).nonzero()[0]
     candidates = candidates[_allowed(speeds.motion(candidates), limits, curvature)]
-    return int(candidates[speeds.cost[candidates].argmin()]) if len(candidates) else None
+    return int(candidates[cost[candidates].argmin()]) if len(candidates) else None
 
 
 # Positions of all profiles (M, P), and the rear and front ends of the boxes (M, 1), wherever some
@@ -390,11 +391,12 @@ def _gentlest(
 _Meetings = tuple[Array, Array, Array]
 
 
-def _meetings(speeds: _Rollouts, rear: Array, front: Array) -> _Meetings:
-    """Where the speed profiles come upon the boxes' ends (N, K)."""
-    met = rear < speeds.most
-    met &= front > speeds.least
-    return speeds.s.take(met.nonzero()[1], axis=0), rear[met][:, None], front[met][:, None]
+def _meetings(speeds: _Rollouts, ends: Array) -> _Meetings:
+    """Where the speed profiles come upon the boxes, of which the ``ends`` (2, N, K) are known."""
+    met = ends[0] < speeds.most
+    met &= ends[1] > speeds.least
+    rear, front = ends[:, met, None]
+    return speeds.s.take(met.nonzero()[1], axis=0), rear, front
 
 
 def _entered(meetings: _Meetings) -> npt.NDArray[np.bool_]:
@@ -446,8 +448,7 @@ def _closest(
 def _kinds(
     profile: _LateralProfile,
     conflict: tuple[int, int] | None,
-    rear: Array,
-    front: Array,
+    ends: Array,
     speeds: _Rollouts,
 ) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_] | None], ...]:
     """The manoeuvres that a lateral motion may be part of, each with the speed profiles (P,) that are others."""
@@ -456,7 +457,7 @@ def _kinds(
     if conflict is None:
         return ((Maneuver.YIELD, None),)
     # Where not even the fastest gets past the obstacle in conflict, all of them yield.
-    rear, front = rear[conflict[1]], front[conflict[1]]
+    rear, front = ends[:, conflict[1]]
     passed = (speeds.most > front) & (rear < np.inf)
     if not np.logical_or.reduce(passed):
         return ((Maneuver.YIELD, None),)
@@ -476,7 +477,9 @@ def _passing(
 ) -> Passing:
     columns = np.zeros((4, len(times), 2))
     columns[0, :, 0], columns[1, :, 0], columns[2, :, 0] = speeds.motion(p)
-    columns[0, :, 1], columns[1, :, 1], columns[2, :, 1] = profile.l, profile.rate, profile.acceleration
+    columns[0, :, 1], columns[1, :, 1] = profile.l, profile.rate
+    if profile.maneuver is not None:
+        columns[2, :, 1] = profile.acceleration
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
     sides = partial(sides_of, guide.position, boxes.lower, boxes.upper)
