@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from repair.passing import Surroundings, blocking, inside
+from repair.passing import Surroundings, inside, overlapping, widened
 from repair.types import Array, FrenetTrajectory, frozen
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Grid:
     hits: list[tuple[int, int]]
     rightmost: list[float]
     leftmost: list[float]
-    _ends: dict[float, Array] = field(default_factory=dict)
+    _wide: dict[float, tuple[Array, npt.NDArray[np.bool_]]] = field(default_factory=dict)
 
     @classmethod
     def over(cls, occupancy: Occupancy, reference: Curve, t_end: float, step: float) -> Grid | None:
@@ -112,12 +112,19 @@ class Grid:
         # The hits are in the order of their steps.
         ahead = self.hits[bisect_left(self.hits, (first, 0)) :]
         conflict = next(((k - first, among.index(j)) for k, j in ahead if j in among), None)
-        ends = self._blocking(margin).take(rows, axis=1)[..., first:]
-        return Surroundings(near.lower[:, steps], near.upper[:, steps], conflict, ends)
+        ends, overlap = self._widened(margin)
+        return Surroundings(
+            near.lower[:, steps],
+            near.upper[:, steps],
+            conflict,
+            ends.take(rows, axis=1)[..., first:],
+            overlap.take(rows, axis=0)[:, first:],
+        )
 
-    def _blocking(self, margin: float) -> Array:
-        """Rear and front ends (2, N, K + 1) of all boxes (:func:`repair.passing.blocking`)."""
-        if margin not in self._ends:
-            lower, upper = self.occupancy.lower[:, : self.last + 1], self.occupancy.upper[:, : self.last + 1]
-            self._ends[margin] = blocking(lower - margin, upper + margin, self.columns[0, :, 1])
-        return self._ends[margin]
+    def _widened(self, margin: float) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Ends (2, N, K + 1) of all boxes along s, and which of them the reference overlaps sideways."""
+        if margin not in self._wide:
+            steps = slice(self.last + 1)
+            ends, edges = widened(self.occupancy.lower[:, steps], self.occupancy.upper[:, steps], margin)
+            self._wide[margin] = frozen(ends), overlapping(edges, self.columns[0, :, 1])
+        return self._wide[margin]

@@ -28,7 +28,15 @@ from repair.types import (
     frozen,
 )
 
-__all__ = ["Surroundings", "blocking", "inside", "open_passings", "sides_of", "surroundings"]
+__all__ = [
+    "Surroundings",
+    "inside",
+    "open_passings",
+    "overlapping",
+    "sides_of",
+    "surroundings",
+    "widened",
+]
 
 # Shares of the acceleration limits, and of the start speed, that are rolled out.
 _BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
@@ -152,21 +160,26 @@ class _LateralProfile(NamedTuple):
     cost: float
 
 
-def _quintic(start: Array, target: float, duration: float, tau: Array) -> tuple[Array, Array, Array]:
-    """Quintic from (l, l', l'') to (target, 0, 0) within ``duration``, then constant."""
-    l0, v0, a0 = start
-    d = max(duration, 1e-3)
-    rest = target - l0 - v0 * d - 0.5 * a0 * d**2
-    slope, bend = -v0 - a0 * d, -a0
-    c3 = (20 * rest - 8 * slope * d + bend * d**2) / (2 * d**3)
-    c4 = (-30 * rest + 14 * slope * d - 2 * bend * d**2) / (2 * d**4)
-    c5 = (12 * rest - 6 * slope * d + bend * d**2) / (2 * d**5)
+# Coefficients of x^3, x^4, x^5 by what is left of the way, the speed and the acceleration at x = 1.
+_QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
+
+
+def _quintics(start: Array, target: Array, duration: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """Quintics (Q, K) from (l, l', l'') to (target, 0, 0) within the durations (Q,), then constant."""
+    l0, v0, a0 = start.tolist()
+    d = np.maximum(duration, 1e-3)
+    speed, bend = v0 * d, a0 * d**2
+    rest = np.array([target - l0 - speed - 0.5 * bend, -speed - bend, -bend])
+    c3, c4, c5 = (_QUINTIC @ rest)[..., None]
+    d = d[:, None]
     u = np.minimum(tau, d)
-    position = l0 + v0 * u + 0.5 * a0 * u**2 + c3 * u**3 + c4 * u**4 + c5 * u**5
-    rate = v0 + a0 * u + 3 * c3 * u**2 + 4 * c4 * u**3 + 5 * c5 * u**4
-    acceleration = a0 + 6 * c3 * u + 12 * c4 * u**2 + 20 * c5 * u**3
+    x = u / d
+    square = x * x
+    position = l0 + (v0 + 0.5 * a0 * u) * u + ((c5 * x + c4) * x + c3) * (square * x)
+    rate = v0 + a0 * u + ((5.0 * c5 * x + 4.0 * c4) * x + 3.0 * c3) * square / d
+    acceleration = a0 + ((20.0 * c5 * x + 12.0 * c4) * x + 6.0 * c3) * x / d**2
     moving = tau <= d
-    return position, np.where(moving, rate, 0.0), np.where(moving, acceleration, 0.0)
+    return position, rate * moving, acceleration * moving
 
 
 class Surroundings(NamedTuple):
@@ -179,22 +192,24 @@ class Surroundings(NamedTuple):
     conflict : (k, j) or None
         First time index, and obstacle, at which the reference is inside of a box.
     ends : (2, N, K) array
-        Rear and front ends that :func:`blocking` says of the reference's lateral motion.
+        Rear and front ends of the boxes, the margin added [m].
+    overlap : (N, K) bool array
+        Which boxes, the margin added, the reference overlaps sideways.
     """
 
     lower: Array
     upper: Array
     conflict: tuple[int, int] | None
     ends: Array
+    overlap: npt.NDArray[np.bool_]
 
 
 def surroundings(reference: FrenetTrajectory, occupancy: Occupancy, margin: float) -> Surroundings:
     """Look them up at the reference's times, whatever these are."""
     lower, upper = occupancy.at(reference.t)
     conflict = _conflict(inside(lower, upper, reference.position))
-    return Surroundings(
-        lower, upper, conflict, blocking(lower - margin, upper + margin, reference.position[:, 1])
-    )
+    ends, edges = widened(lower, upper, margin)
+    return Surroundings(lower, upper, conflict, ends, overlapping(edges, reference.position[:, 1]))
 
 
 def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
@@ -203,13 +218,18 @@ def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
     return within[..., 0] & within[..., 1]
 
 
-def blocking(lower: Array, upper: Array, l: Array) -> Array:  # noqa: E741
-    """Rear and front ends (2, N, K) of the boxes, as a lateral motion l (K,) meets them.
+def widened(lower: Array, upper: Array, margin: float) -> tuple[Array, Array]:
+    """Ends (2, N, K) of the boxes along s, and along l, with the margin: the lower ones, then the upper ones."""
+    corners = np.array([lower, upper])
+    corners[0] -= margin
+    corners[1] += margin
+    return corners[..., 0], corners[..., 1]
 
-    Those that it does not overlap sideways begin infinitely far away: nobody enters them.
-    """
-    overlap = (lower[..., 1] < l) & (l < upper[..., 1])
-    return np.array([np.where(overlap, lower[..., 0], np.inf), upper[..., 0]])
+
+def overlapping(edges: Array, l: Array) -> npt.NDArray[np.bool_]:  # noqa: E741
+    """Which boxes (..., N, K), between ``edges`` (2, N, K), lateral motions l (..., K) overlap sideways."""
+    sideways = l[..., None, :]
+    return np.asarray((edges[0] < sideways) & (sideways < edges[1]))
 
 
 def _conflict(hit: npt.NDArray[np.bool_]) -> tuple[int, int] | None:
@@ -246,20 +266,25 @@ def _lateral_profiles(
         (Maneuver.LEFT, float(np.fmax.reduce(upper[j, beside, 1])) + margin),
         (Maneuver.RIGHT, float(np.fmin.reduce(lower[j, beside, 1])) - margin),
     )
+    rightmost, leftmost = float(right[beside].max()) - 1e-6, float(left[beside].min()) + 1e-6
+    available = float(tau[k])
+    moves = []
     for maneuver, target in targets:
-        if not right[beside].max() - 1e-6 <= target <= left[beside].min() + 1e-6:
+        if not rightmost <= target <= leftmost:
             continue
         shift = abs(target - float(start[0, 1]))
         # Peak acceleration of a quintic lane change is 10/sqrt(3) shift / T**2.
-        shortest = max(np.sqrt(5.8 * shift / (0.9 * limits.a_lat)), 1.9 * shift / limits.v_lat, 0.3)
-        available = float(tau[k])
-        for duration in sorted(
-            {shortest, max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))}
-        ):
-            position, rate, acceleration = _quintic(start[:, 1], target, duration, tau)
-            cost = float(np.mean(acceleration**2)) + 0.1
-            profiles.append(_LateralProfile(maneuver, position, rate, acceleration, cost))
-    return profiles
+        shortest = max(math.sqrt(5.8 * shift / (0.9 * limits.a_lat)), 1.9 * shift / limits.v_lat, 0.3)
+        durations = {shortest, max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))}
+        moves += [(maneuver, target, duration) for duration in sorted(durations)]
+    if not moves:
+        return profiles
+    kinds, target, duration = zip(*moves, strict=True)
+    l, rate, acceleration = _quintics(start[:, 1], np.array(target), np.array(duration), tau)  # noqa: E741
+    cost = np.add.reduce(acceleration**2, axis=1) / len(tau) + 0.1
+    return profiles + [
+        _LateralProfile(*one) for one in zip(kinds, l, rate, acceleration, cost.tolist(), strict=True)
+    ]
 
 
 def open_passings(
@@ -305,17 +330,20 @@ def open_passings(
     boxes = boxes or surroundings(reference, occupancy, margin)
     profiles = _lateral_profiles(start, tau, reference, boxes, limits, bounds, margin + 0.05, lateral)
     speeds = _speed_profiles(start, tau, limits)
+    bends = _Bends(speeds, limits, curvature)
+    overlaps = [boxes.overlap]
     if len(profiles) > 1:
-        wide_lower, wide_upper = boxes.lower - margin, boxes.upper + margin
+        edges = widened(boxes.lower, boxes.upper, margin)[1]
+        overlaps += list(overlapping(edges, np.array([profile.l for profile in profiles[1:]])))
+    within = (boxes.ends[0] < speeds.most) & (boxes.ends[1] > speeds.least)
     best: dict[Maneuver, tuple[float, int, _LateralProfile]] = {}
     shut: list[_Shut] = []
-    for profile in profiles:
-        ends = boxes.ends if profile.maneuver is None else blocking(wide_lower, wide_upper, profile.l)
-        meetings = _meetings(speeds, ends)
+    for profile, overlap in zip(profiles, overlaps, strict=True):
+        meetings = _meetings(speeds, boxes.ends, within & overlap)
         # What a guide must not do has no cost; nor has what counts as another manoeuvre.
         cost = np.where(_entered(meetings) | speeds.family.harsh, np.inf, speeds.cost)
-        for maneuver, others in _kinds(profile, boxes.conflict, ends, speeds):
-            p = _gentlest(speeds, cost if others is None else np.where(others, np.inf, cost), limits, curvature)
+        for maneuver, others in _kinds(profile, boxes, speeds):
+            p = _gentlest(cost if others is None else np.where(others, np.inf, cost), bends)
             if p is not None:
                 total = float(cost[p]) + profile.cost
                 if maneuver not in best or total < best[maneuver][0]:
@@ -324,7 +352,7 @@ def open_passings(
                 shut.append(_Shut(profile, maneuver, others, meetings))
     if Maneuver.YIELD not in best and Maneuver.GO_AHEAD not in best:
         wanted: list[Maneuver | None] = [None] if best else [None, Maneuver.LEFT, Maneuver.RIGHT]
-        best |= _closest(speeds, shut, wanted, limits, curvature)
+        best |= _closest(shut, wanted, bends)
     passings = [
         _passing(maneuver, cost, speeds, p, profile, reference.t, boxes)
         for maneuver, (cost, p, profile) in best.items()
@@ -332,57 +360,54 @@ def open_passings(
     return tuple(sorted(passings, key=lambda x: x.cost))
 
 
-def _demand(motion: tuple[Array, Array, Array], curvature: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Largest total and lateral acceleration of motions (K, P') along the path, bends included."""
-    s, v, acceleration = motion
-    bend = np.abs(np.interp(s, *curvature)) * (v * v)
-    total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))
-    return total, np.maximum.reduce(bend, axis=0)
+class _Bends:
+    """What the path's bends leave to the speed profiles: the friction circle and the lateral limit."""
+
+    def __init__(self, speeds: _Rollouts, limits: Limits, curvature: tuple[Array, Array]) -> None:
+        self.speeds = speeds
+        self.total, self.lateral = _GUIDED * limits.a_total, _GUIDED * limits.a_lat
+        self.curvature = curvature
+        self._allowed: dict[int, bool] = {}
+
+    def allow(self, p: int) -> bool:
+        """Whether a profile keeps to both; several lateral motions ask for the same ones."""
+        if p not in self._allowed:
+            self._allowed[p] = self.surely_allow(p) or bool(self.excess(p) == 0.0)
+        return self._allowed[p]
+
+    def surely_allow(self, p: int) -> bool:
+        """Whether it does so even if it took the sharpest bend on its way at its highest speed.
+
+        Nearly all do, and this takes a few numbers only; of the others it says nothing.
+        """
+        speeds, (where, kappa) = self.speeds, self.curvature
+        first, last = where.searchsorted((speeds.s[0, p], speeds.s[-1, p])).tolist()
+        sharpest = float(np.maximum.reduce(np.abs(kappa[max(first - 1, 0) : last + 1])))
+        rate = float(speeds.family.rate[p])
+        highest = speeds.v0 + max(rate * float(speeds.ramp[-1, p]), 0.0)
+        # A little more than the true numbers, which are rounded in another order.
+        bend = (1.0 + 1e-9) * sharpest * highest**2
+        return bend <= self.lateral and (1.0 + 1e-9) * math.hypot(bend, rate) <= self.total
+
+    def excess(self, p: int | slice | npt.NDArray[np.intp]) -> Array:
+        """By how much profiles (P',) do not keep to them."""
+        s, v, acceleration = self.speeds.motion(p)
+        bend = np.abs(np.interp(s, *self.curvature)) * (v * v)
+        total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))
+        excess = np.maximum(total - self.total, np.maximum.reduce(bend, axis=0) - self.lateral)
+        return np.asarray(np.maximum(excess, 0.0))
 
 
-def _allowed(
-    motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple[Array, Array]
-) -> npt.NDArray[np.bool_]:
-    """Which motions keep to the friction circle and the lateral limit in the path's bends."""
-    total, lateral = _demand(motion, curvature)
-    return (total <= _GUIDED * limits.a_total) & (lateral <= _GUIDED * limits.a_lat)
-
-
-def _surely_allowed(speeds: _Rollouts, p: int, limits: Limits, curvature: tuple[Array, Array]) -> bool:
-    """Whether a profile keeps to both even if it took the sharpest bend on its way at its highest speed.
-
-    Nearly all do, and this takes a few numbers only; of the others it says nothing.
-    """
-    where, kappa = curvature
-    first, last = where.searchsorted((speeds.s[0, p], speeds.s[-1, p])).tolist()
-    sharpest = float(np.maximum.reduce(np.abs(kappa[max(first - 1, 0) : last + 1])))
-    rate = float(speeds.family.rate[p])
-    highest = speeds.v0 + max(rate * float(speeds.ramp[-1, p]), 0.0)
-    # A little more than the true numbers, which are rounded in another order.
-    bend = (1.0 + 1e-9) * sharpest * highest**2
-    total = (1.0 + 1e-9) * math.hypot(bend, rate)
-    return total <= _GUIDED * limits.a_total and bend <= _GUIDED * limits.a_lat
-
-
-def _excess(motion: tuple[Array, Array, Array], limits: Limits, curvature: tuple[Array, Array]) -> Array:
-    """By how much they do not."""
-    total, lateral = _demand(motion, curvature)
-    excess = np.maximum(total - _GUIDED * limits.a_total, lateral - _GUIDED * limits.a_lat)
-    return np.asarray(np.maximum(excess, 0.0))
-
-
-def _gentlest(
-    speeds: _Rollouts, cost: Array, limits: Limits, curvature: tuple[Array, Array]
-) -> int | None:
+def _gentlest(cost: Array, bends: _Bends) -> int | None:
     """The cheapest of the speed profiles (P,) of finite ``cost`` that the bends allow."""
     first = int(cost.argmin())
     if cost[first] == np.inf:
         return None
     # The cheapest is nearly always allowed; looking at all of them takes a hundred times as many numbers.
-    if _surely_allowed(speeds, first, limits, curvature) or _allowed(speeds.motion(first), limits, curvature):
+    if bends.allow(first):
         return first
     candidates = (cost < np.inf).nonzero()[0]
-    candidates = candidates[_allowed(speeds.motion(candidates), limits, curvature)]
+    candidates = candidates[bends.excess(candidates) == 0.0]
     return int(candidates[cost[candidates].argmin()]) if len(candidates) else None
 
 
@@ -391,10 +416,8 @@ def _gentlest(
 _Meetings = tuple[Array, Array, Array]
 
 
-def _meetings(speeds: _Rollouts, ends: Array) -> _Meetings:
-    """Where the speed profiles come upon the boxes, of which the ``ends`` (2, N, K) are known."""
-    met = ends[0] < speeds.most
-    met &= ends[1] > speeds.least
+def _meetings(speeds: _Rollouts, ends: Array, met: npt.NDArray[np.bool_]) -> _Meetings:
+    """Speed profiles and ``ends`` (2, N, K) of the boxes where they are ``met`` (N, K)."""
     rear, front = ends[:, met, None]
     return speeds.s.take(met.nonzero()[1], axis=0), rear, front
 
@@ -423,14 +446,10 @@ class _Shut(NamedTuple):
 
 
 def _closest(
-    speeds: _Rollouts,
-    shut: list[_Shut],
-    wanted: list[Maneuver | None],
-    limits: Limits,
-    curvature: tuple[Array, Array],
+    shut: list[_Shut], wanted: list[Maneuver | None], bends: _Bends
 ) -> dict[Maneuver, tuple[float, int, _LateralProfile]]:
     """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
-    excess = _excess(speeds.motion(slice(None)), limits, curvature)
+    excess = bends.excess(slice(None))
     closest: dict[Maneuver | None, tuple[float, int, _LateralProfile, Maneuver]] = {}
     for profile, maneuver, others, meetings in shut:
         if profile.maneuver not in wanted:
@@ -446,24 +465,21 @@ def _closest(
 
 
 def _kinds(
-    profile: _LateralProfile,
-    conflict: tuple[int, int] | None,
-    ends: Array,
-    speeds: _Rollouts,
+    profile: _LateralProfile, boxes: Surroundings, speeds: _Rollouts
 ) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_] | None], ...]:
     """The manoeuvres that a lateral motion may be part of, each with the speed profiles (P,) that are others."""
     if profile.maneuver is not None:
         return ((profile.maneuver, None),)
-    if conflict is None:
+    if boxes.conflict is None:
         return ((Maneuver.YIELD, None),)
     # Where not even the fastest gets past the obstacle in conflict, all of them yield.
-    rear, front = ends[:, conflict[1]]
-    passed = (speeds.most > front) & (rear < np.inf)
-    if not np.logical_or.reduce(passed):
+    j = boxes.conflict[1]
+    front = boxes.ends[1, j]
+    k = ((speeds.most > front) & boxes.overlap[j]).nonzero()[0]
+    if not len(k):
         return ((Maneuver.YIELD, None),)
-    k = passed.nonzero()[0]
-    others = np.logical_or.reduce(speeds.s.take(k, axis=0) > front[k][:, None], axis=0)
-    return (Maneuver.YIELD, others), (Maneuver.GO_AHEAD, ~others)
+    passed = np.logical_or.reduce(speeds.s.take(k, axis=0) > front[k][:, None], axis=0)
+    return (Maneuver.YIELD, passed), (Maneuver.GO_AHEAD, ~passed)
 
 
 def _passing(
