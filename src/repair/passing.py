@@ -11,12 +11,13 @@ limits; it shows that a way is open, and a backend makes a trajectory of it.
 from __future__ import annotations
 
 import math
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from repair.speeds import Bends, Rollouts, speed_profiles
 from repair.types import (
     Array,
     FrenetTrajectory,
@@ -25,7 +26,6 @@ from repair.types import (
     Maneuver,
     Occupancy,
     Passing,
-    frozen,
 )
 
 __all__ = [
@@ -38,116 +38,8 @@ __all__ = [
     "widened",
 ]
 
-# Shares of the acceleration limits, and of the start speed, that are rolled out.
-_BRAKING = (0.125, 0.25, 0.5, 0.75, 1.0)
-_THROTTLE = (0.5, 1.0)
-_GAINS = (2.0, 5.0, 50.0)
-_DELAYS = (0.0, 1.5, 3.0)
-_HOLD = (0.0, 0.2, 0.4, 0.6, 0.8)
 # The cost of a way that is not open starts here, far above those of open ones.
 _SHUT = 1e3
-# Share of the friction circle and of the lateral limit that a guide may use: a tenth of both is left
-# to what a backend makes of it.
-_GUIDED = 0.9
-
-
-class _Family(NamedTuple):
-    """What all speed profiles have in common that start at the same time before the end.
-
-    A profile holds the speed v0 for a delay, then changes it at the rate to share * v0 + gain.
-    """
-
-    rate: Array  # (P,), as are share and gain
-    share: Array
-    gain: Array
-    weight: Array  # what a sample with this rate adds to the mean square of the acceleration
-    half: Array  # (K, P), half of the rate: arrays of one shape are multiplied twice as fast
-    since: Array  # (K, P), the time since the change began, 0 before it
-    begun: Array  # (K, P), the same, but inf before it
-    harsh: npt.NDArray[np.bool_]  # (P,), the change alone is more than a guide may ask of the tyres
-    slowest: int
-    fastest: int
-
-
-class _Rollouts(NamedTuple):
-    """Speed profiles over the guide's times; speed and acceleration are made for those that are looked at.
-
-    Position s and time spent changing the speed (K, P), how long the change takes and cost (P,), and
-    how far back and forth any of them gets (K,).
-    """
-
-    family: _Family
-    v0: float
-    s: Array
-    ramp: Array
-    change: Array
-    cost: Array
-    least: Array
-    most: Array
-
-    def motion(self, p: int | slice | npt.NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """Position, speed and acceleration of the profiles ``p``, (K,) or (K, P')."""
-        rate = self.family.rate[p]
-        v = rate * self.ramp[:, p] + self.v0
-        return self.s[:, p], v, rate * (self.family.begun[:, p] < self.change[p])
-
-
-@lru_cache(maxsize=64)
-def _family(a_min: float, a_max: float, a_total: float, count: int, step: float) -> _Family:
-    """All profiles over ``count`` samples, ``step`` apart."""
-    tau = step * np.arange(count)
-    family = [(0.0, 1.0, 1.0, 0.0)]  # to the speed that it has: no change
-    family += [(0.0, share * a_min, hold, 0.0) for share in _BRAKING for hold in _HOLD]
-    family += [
-        (delay, share * a_max, 1.0, gain)
-        for share in _THROTTLE
-        for gain in _GAINS
-        for delay in _DELAYS
-        if delay < tau[-1]
-    ]
-    hardest = (0.0, _THROTTLE[-1] * a_max, 1.0, _GAINS[-1])
-    delay, rate, share, gain = (frozen(column) for column in np.array(family).T)
-    since = tau[:, None] - delay
-    # Who begins on a sample shows the acceleration there, or else changes nothing.
-    harsh = (np.abs(rate) > _GUIDED * a_total) & (since == 0.0).any(axis=0)
-    harsh.setflags(write=False)
-    return _Family(
-        rate,
-        share,
-        gain,
-        weight=frozen(rate**2 / count),
-        half=frozen(np.broadcast_to(0.5 * rate, since.shape)),
-        since=frozen(np.maximum(since, 0.0)),
-        begun=frozen(np.where(since >= 0.0, since, np.inf)),
-        harsh=harsh,
-        slowest=family.index((0.0, _BRAKING[-1] * a_min, _HOLD[0], 0.0)),
-        fastest=family.index(hardest) if hardest in family else 0,
-    )
-
-
-def _speed_profiles(start: Array, tau: Array, limits: Limits) -> _Rollouts:
-    """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
-    s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
-    count, duration = len(tau), max(float(tau[-1]), 1e-9)
-    step = round(duration / max(count - 1, 1), 9)
-    family = _family(limits.a_min, limits.a_max, limits.a_total, count, step)
-    rise = np.minimum(family.share * v0 + family.gain, max(limits.v_max, v0)) - v0
-    change = rise / family.rate
-    ramp = np.minimum(family.since, change)
-    # v0 tau + rate ramp^2 / 2 + rise (since - ramp)
-    s = family.half * ramp
-    s -= rise
-    s *= ramp
-    s += rise * family.since
-    s += (s0 + v0 * tau)[:, None]
-    # mean square of the acceleration, and the way that is lost
-    cost = family.weight * np.add.reduce(family.begun < change, axis=0)
-    lost = s[-1] - s[-1, 0]
-    lost *= lost
-    lost *= 0.01 / max(duration, 1.0) ** 2
-    cost += lost
-    # Who brakes hardest and to a stop is behind all others at any time, who accelerates hardest ahead.
-    return _Rollouts(family, v0, s, ramp, change, cost, least=s[:, family.slowest], most=s[:, family.fastest])
 
 
 class _LateralProfile(NamedTuple):
@@ -219,7 +111,7 @@ def inside(lower: Array, upper: Array, path: Array) -> npt.NDArray[np.bool_]:
 
 
 def widened(lower: Array, upper: Array, margin: float) -> tuple[Array, Array]:
-    """Ends (2, N, K) of the boxes along s, and along l, with the margin: the lower ones, then the upper ones."""
+    """Lower and upper ends (2, N, K) of the boxes with the margin, along s and along l."""
     corners = np.array([lower, upper])
     corners[0] -= margin
     corners[1] += margin
@@ -261,12 +153,12 @@ def _lateral_profiles(
     beside = (lower[j, :, 0] - room < s) & (s < upper[j, :, 0] + room)
     if not beside.any():
         return profiles
-    right, left = bounds.at(s)
+    right, left = bounds.at(s[beside])
     targets = (
         (Maneuver.LEFT, float(np.fmax.reduce(upper[j, beside, 1])) + margin),
         (Maneuver.RIGHT, float(np.fmin.reduce(lower[j, beside, 1])) - margin),
     )
-    rightmost, leftmost = float(right[beside].max()) - 1e-6, float(left[beside].min()) + 1e-6
+    rightmost, leftmost = float(right.max()) - 1e-6, float(left.min()) + 1e-6
     available = float(tau[k])
     moves = []
     for maneuver, target in targets:
@@ -275,12 +167,12 @@ def _lateral_profiles(
         shift = abs(target - float(start[0, 1]))
         # Peak acceleration of a quintic lane change is 10/sqrt(3) shift / T**2.
         shortest = max(math.sqrt(5.8 * shift / (0.9 * limits.a_lat)), 1.9 * shift / limits.v_lat, 0.3)
-        durations = {shortest, max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))}
-        moves += [(maneuver, target, duration) for duration in sorted(durations)]
+        longer = max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))
+        moves += [(maneuver, target, duration) for duration in sorted({shortest, *longer})]
     if not moves:
         return profiles
-    kinds, target, duration = zip(*moves, strict=True)
-    l, rate, acceleration = _quintics(start[:, 1], np.array(target), np.array(duration), tau)  # noqa: E741
+    kinds, ends, durations = zip(*moves, strict=True)
+    l, rate, acceleration = _quintics(start[:, 1], np.array(ends), np.array(durations), tau)  # noqa: E741
     cost = np.add.reduce(acceleration**2, axis=1) / len(tau) + 0.1
     return profiles + [
         _LateralProfile(*one) for one in zip(kinds, l, rate, acceleration, cost.tolist(), strict=True)
@@ -329,8 +221,8 @@ def open_passings(
     tau = reference.t - reference.t[0]
     boxes = boxes or surroundings(reference, occupancy, margin)
     profiles = _lateral_profiles(start, tau, reference, boxes, limits, bounds, margin + 0.05, lateral)
-    speeds = _speed_profiles(start, tau, limits)
-    bends = _Bends(speeds, limits, curvature)
+    speeds = speed_profiles(start, tau, limits)
+    bends = Bends(speeds, limits, curvature)
     overlaps = [boxes.overlap]
     if len(profiles) > 1:
         edges = widened(boxes.lower, boxes.upper, margin)[1]
@@ -340,7 +232,7 @@ def open_passings(
     shut: list[_Shut] = []
     for profile, overlap in zip(profiles, overlaps, strict=True):
         meetings = _meetings(speeds, boxes.ends, within & overlap)
-        # What a guide must not do has no cost; nor has what counts as another manoeuvre.
+        # What a guide must not do costs infinitely much, and so does what counts as another manoeuvre.
         cost = np.where(_entered(meetings) | speeds.family.harsh, np.inf, speeds.cost)
         for maneuver, others in _kinds(profile, boxes, speeds):
             p = _gentlest(cost if others is None else np.where(others, np.inf, cost), bends)
@@ -348,7 +240,7 @@ def open_passings(
                 total = float(cost[p]) + profile.cost
                 if maneuver not in best or total < best[maneuver][0]:
                     best[maneuver] = (total, p, profile)
-            elif others is None or not others.all():
+            else:
                 shut.append(_Shut(profile, maneuver, others, meetings))
     if Maneuver.YIELD not in best and Maneuver.GO_AHEAD not in best:
         wanted: list[Maneuver | None] = [None] if best else [None, Maneuver.LEFT, Maneuver.RIGHT]
@@ -360,45 +252,7 @@ def open_passings(
     return tuple(sorted(passings, key=lambda x: x.cost))
 
 
-class _Bends:
-    """What the path's bends leave to the speed profiles: the friction circle and the lateral limit."""
-
-    def __init__(self, speeds: _Rollouts, limits: Limits, curvature: tuple[Array, Array]) -> None:
-        self.speeds = speeds
-        self.total, self.lateral = _GUIDED * limits.a_total, _GUIDED * limits.a_lat
-        self.curvature = curvature
-        self._allowed: dict[int, bool] = {}
-
-    def allow(self, p: int) -> bool:
-        """Whether a profile keeps to both; several lateral motions ask for the same ones."""
-        if p not in self._allowed:
-            self._allowed[p] = self.surely_allow(p) or bool(self.excess(p) == 0.0)
-        return self._allowed[p]
-
-    def surely_allow(self, p: int) -> bool:
-        """Whether it does so even if it took the sharpest bend on its way at its highest speed.
-
-        Nearly all do, and this takes a few numbers only; of the others it says nothing.
-        """
-        speeds, (where, kappa) = self.speeds, self.curvature
-        first, last = where.searchsorted((speeds.s[0, p], speeds.s[-1, p])).tolist()
-        sharpest = float(np.maximum.reduce(np.abs(kappa[max(first - 1, 0) : last + 1])))
-        rate = float(speeds.family.rate[p])
-        highest = speeds.v0 + max(rate * float(speeds.ramp[-1, p]), 0.0)
-        # A little more than the true numbers, which are rounded in another order.
-        bend = (1.0 + 1e-9) * sharpest * highest**2
-        return bend <= self.lateral and (1.0 + 1e-9) * math.hypot(bend, rate) <= self.total
-
-    def excess(self, p: int | slice | npt.NDArray[np.intp]) -> Array:
-        """By how much profiles (P',) do not keep to them."""
-        s, v, acceleration = self.speeds.motion(p)
-        bend = np.abs(np.interp(s, *self.curvature)) * (v * v)
-        total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))
-        excess = np.maximum(total - self.total, np.maximum.reduce(bend, axis=0) - self.lateral)
-        return np.asarray(np.maximum(excess, 0.0))
-
-
-def _gentlest(cost: Array, bends: _Bends) -> int | None:
+def _gentlest(cost: Array, bends: Bends) -> int | None:
     """The cheapest of the speed profiles (P,) of finite ``cost`` that the bends allow."""
     first = int(cost.argmin())
     if cost[first] == np.inf:
@@ -416,7 +270,7 @@ def _gentlest(cost: Array, bends: _Bends) -> int | None:
 _Meetings = tuple[Array, Array, Array]
 
 
-def _meetings(speeds: _Rollouts, ends: Array, met: npt.NDArray[np.bool_]) -> _Meetings:
+def _meetings(speeds: Rollouts, ends: Array, met: npt.NDArray[np.bool_]) -> _Meetings:
     """Speed profiles and ``ends`` (2, N, K) of the boxes where they are ``met`` (N, K)."""
     rear, front = ends[:, met, None]
     return speeds.s.take(met.nonzero()[1], axis=0), rear, front
@@ -446,7 +300,7 @@ class _Shut(NamedTuple):
 
 
 def _closest(
-    shut: list[_Shut], wanted: list[Maneuver | None], bends: _Bends
+    shut: list[_Shut], wanted: list[Maneuver | None], bends: Bends
 ) -> dict[Maneuver, tuple[float, int, _LateralProfile]]:
     """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
     excess = bends.excess(slice(None))
@@ -458,16 +312,16 @@ def _closest(
         if others is not None:
             badness[others] = np.inf
         p = int(badness.argmin())
-        if profile.maneuver not in closest or badness[p] < closest[profile.maneuver][0]:
+        if badness[p] < (closest[profile.maneuver][0] if profile.maneuver in closest else np.inf):
             closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
     found = (closest[kind] for kind in wanted if kind in closest)
     return {maneuver: (_SHUT + badness, p, profile) for badness, p, profile, maneuver in found}
 
 
 def _kinds(
-    profile: _LateralProfile, boxes: Surroundings, speeds: _Rollouts
+    profile: _LateralProfile, boxes: Surroundings, speeds: Rollouts
 ) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_] | None], ...]:
-    """The manoeuvres that a lateral motion may be part of, each with the speed profiles (P,) that are others."""
+    """The manoeuvres that a lateral motion may be part of; for each the speed profiles (P,) of others."""
     if profile.maneuver is not None:
         return ((profile.maneuver, None),)
     if boxes.conflict is None:
@@ -485,7 +339,7 @@ def _kinds(
 def _passing(
     maneuver: Maneuver,
     cost: float,
-    speeds: _Rollouts,
+    speeds: Rollouts,
     p: int,
     profile: _LateralProfile,
     times: Array,

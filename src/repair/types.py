@@ -290,7 +290,7 @@ class Passing:
         cost: float,
         open: bool = True,
     ) -> Passing:
-        """One whose ``side`` is made by ``sides`` when it is asked for: most backends take the guide alone."""
+        """One whose ``side`` is made by ``sides`` if it is asked for: most backends take the guide alone."""
         passing = cls.__new__(cls)
         passing.__dict__.update(maneuver=maneuver, guide=guide, cost=cost, open=open, _sides=sides)
         return passing

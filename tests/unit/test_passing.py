@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests import toy
 
-from repair.passing import _allowed, _speed_profiles, _surely_allowed, open_passings
+from repair.passing import (
+    _kinds,
+    _lateral_profiles,
+    _quintics,
+    open_passings,
+    sides_of,
+    surroundings,
+)
 from repair.reference import SpeedProfile
+from repair.speeds import Bends, speed_profiles
 from repair.types import LateralBounds, Maneuver, Side, frozen
 
 MARGIN = 0.1
@@ -270,15 +281,100 @@ def test_every_open_guide_is_free_and_on_the_side_it_says(rows, v0, lateral, t_e
 )
 def test_the_quick_look_at_the_bends_allows_nothing_that_the_long_one_does_not(v0, a0, bends, p):
     tau = toy.DT * np.arange(41)
-    speeds = _speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [a0, 0.0]]), tau, toy.LIMITS)
+    speeds = speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [a0, 0.0]]), tau, toy.LIMITS)
     curvature = (np.linspace(-5.0, 60.0, len(bends)), np.array(bends))
-    if _surely_allowed(speeds, p, toy.LIMITS, curvature):
-        assert _allowed(speeds.motion(p), toy.LIMITS, curvature)
+    bends = Bends(speeds, toy.LIMITS, curvature)
+    if bends.surely_allow(p):
+        assert bends.excess(p) == 0.0
+    assert bends.allow(p) == (bends.excess(slice(None))[p] == 0.0)
+
+
+@given(
+    st.floats(0.0, 40.0), st.floats(1.0, 12.0), st.sampled_from([3, 17, 41]), st.sampled_from([0.1, 0.2, 0.4])
+)
+def test_a_harsh_change_is_never_allowed_unless_it_changes_nothing(v0, a_total, count, step):
+    """Such profiles are not looked at; one that changes nothing is the first one again, which is."""
+    limits = replace(toy.LIMITS, a_total=a_total)
+    tau = step * np.arange(count)
+    speeds = speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [0.0, 0.0]]), tau, limits)
+    excess = Bends(speeds, limits, STRAIGHT).excess(slice(None))
+    for p in speeds.family.harsh.nonzero()[0]:
+        assert excess[p] > 0.0 or np.allclose(speeds.s[:, p], speeds.s[:, 0], rtol=0.0, atol=1e-12)
+
+
+@given(
+    st.floats(-3.0, 3.0),
+    st.floats(-2.0, 2.0),
+    st.floats(-2.0, 2.0),
+    st.floats(-6.0, 6.0),
+    st.floats(0.3, 7.0),
+)
+def test_a_lateral_motion_joins_its_ends_smoothly(l0, v0, a0, target, duration):
+    """Within the duration against the boundary conditions and finite differences; at rest afterwards."""
+    tau = np.linspace(0.0, duration, 2001)
+    start = np.array([l0, v0, a0])
+    pair = np.array([target, -target]), np.array([duration, 1.5 * duration])
+    position, rate, acceleration = (values[0] for values in _quintics(start, *pair, tau))
+    np.testing.assert_allclose((position[0], rate[0], acceleration[0]), start, atol=1e-9)
+    np.testing.assert_allclose((position[-1], rate[-1], acceleration[-1]), (target, 0.0, 0.0), atol=1e-9)
+    scale = 1.0 + np.abs(acceleration).max()
+    np.testing.assert_allclose(np.gradient(position, tau)[1:-1], rate[1:-1], atol=1e-2 * scale)
+    np.testing.assert_allclose(np.gradient(rate, tau)[1:-1], acceleration[1:-1], atol=1e-1 * scale)
+    later = _quintics(start, *pair, np.array([duration + 0.1, 2.0 * duration]))
+    np.testing.assert_allclose(later[0][0], target, atol=1e-9)
+    assert not later[1][0].any()
+    assert not later[2][0].any()
+
+
+def test_sides_are_made_when_they_are_asked_for():
+    beside = toy.box((5.0, 9.0), (3.0, 5.0), present=(1.0, 2.0))
+    cars = toy.occupancy(toy.box((30.0, 35.0), (-1.0, 1.0)), beside)
+    reference = toy.constant().sample(toy.DT * np.arange(41))
+    start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+    first, *_ = open_passings(reference, start, cars, toy.WIDE, toy.LIMITS, MARGIN, True, STRAIGHT)
+    assert "side" not in vars(first)
+    known = pickle.loads(pickle.dumps(first))
+    expected = sides_of(first.guide.position, *cars.at(first.guide.t))
+    np.testing.assert_array_equal(first.side, expected)
+    assert (first.side[1, [0, 9, 21, 40]] == Side.BEHIND).all()  # where it is not there
+    assert first.side[1, 10] == Side.RIGHT
+    assert first.side is vars(first)["side"]
+    np.testing.assert_array_equal(known.side, expected)
+    np.testing.assert_array_equal(replace(first, cost=0.0).side, expected)
+    with pytest.raises(AttributeError, match="sides"):
+        _ = first.sides
 
 
 @given(st.floats(0.0, 40.0))
 def test_all_profiles_lie_between_the_slowest_and_the_fastest(v0):
     tau = toy.DT * np.arange(41)
-    speeds = _speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [0.0, 0.0]]), tau, toy.LIMITS)
+    speeds = speed_profiles(np.array([[0.0, 0.0], [v0, 0.0], [0.0, 0.0]]), tau, toy.LIMITS)
     assert (speeds.s >= speeds.least[:, None] - 1e-9).all()
     assert (speeds.s <= speeds.most[:, None] + 1e-9).all()
+
+
+@given(st.lists(boxes, min_size=1, max_size=4), st.floats(0.0, 20.0), st.sampled_from([-0.5, 0.1, 2.0]))
+def test_who_gets_past_the_obstacle_in_conflict_goes_ahead(rows, v0, margin):
+    """Against all profiles at all times, also where the fastest tells that there is none."""
+    cars = toy.occupancy(
+        *(
+            toy.box((s, s + a), (l, l + b), v=(vs, vl), present=(round(begin, 1), begin + stay))
+            for s, a, l, b, vs, vl, begin, stay in rows  # noqa: E741
+        )
+    )
+    reference = toy.constant(v0).sample(toy.DT * np.arange(41))
+    met = surroundings(reference, cars, margin)
+    start = np.array([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+    speeds = speed_profiles(start, reference.t, toy.LIMITS)
+    (keep,) = _lateral_profiles(start, reference.t, reference, met, toy.LIMITS, toy.WIDE, margin, False)
+    found = dict(_kinds(keep, met, speeds))
+    passed = np.zeros(len(speeds.cost), dtype=bool)
+    if met.conflict is not None:
+        _, upper = cars.at(reference.t)
+        front = upper[met.conflict[1], :, 0] + margin
+        passed = ((front < speeds.s.T) & met.overlap[met.conflict[1]]).any(axis=1)
+    assert Maneuver.GO_AHEAD in found or not passed.any()
+    others = found[Maneuver.YIELD]
+    np.testing.assert_array_equal(passed, False if others is None else others)
+    if Maneuver.GO_AHEAD in found:
+        np.testing.assert_array_equal(found[Maneuver.GO_AHEAD], ~passed)
