@@ -9,6 +9,7 @@ t_start + (i - (p - 1) / 2) dt.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, comb, factorial
@@ -19,11 +20,13 @@ import numpy.typing as npt
 from repair.types import Array, Curve, FrenetTrajectory, frozen
 
 __all__ = [
+    "KEPT",
     "UniformBSpline",
     "basis_matrix",
     "bernstein_matrix",
     "derivative_matrix",
     "fit_to_curve",
+    "hold_ends",
     "n_points_for",
     "segment_matrix",
     "splice_points",
@@ -93,7 +96,7 @@ def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order:
     return matrix
 
 
-_KEPT = 40_000  # times * points of the largest matrix that is kept: 1.3 MB
+KEPT = 40_000  #: times * points of the largest sampling matrix that is kept: 1.3 MB
 
 
 @lru_cache(maxsize=64)
@@ -103,25 +106,39 @@ def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
     return frozen(np.ascontiguousarray(matrix.T))
 
 
-@lru_cache(maxsize=64)
-def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
+def hold_ends(times: bytes, t_start: float, t_end: float, values: Callable[[bytes], Array]) -> Array:
     """Matrix (n, 4 K) from control points to position and three derivatives at ``times``.
 
     Beyond the span the end speed is held, which is linear in the control points as well.
+
+    Parameters
+    ----------
+    times : bytes
+        Of a (K,) array [s].
+    t_start, t_end : float
+        The curve's span [s].
+    values : callable
+        The matrix for times (bytes) within the span, counted from its start.
     """
     since = np.frombuffer(times) - t_start
-    tau = np.clip(since, 0.0, t_start + (n - degree) * spacing - t_start)
+    tau = np.clip(since, 0.0, t_end - t_start)
     # The same offsets come back for other start times, up to rounding.
-    made = _sampling if len(tau) * n <= _KEPT else _sampling.__wrapped__
-    matrix = made(np.round(tau, 12).tobytes(), n, degree, spacing)
+    matrix = values(np.round(tau, 12).tobytes())
     beyond = since - tau
     out = np.flatnonzero(np.abs(beyond) > 1e-9)
     if not len(out):
         return matrix
-    held = matrix.reshape(n, 4, len(tau)).copy()
+    held = matrix.reshape(len(matrix), 4, len(tau)).copy()
     held[:, 0, out] += beyond[out] * held[:, 1, out]
     held[:, 2:, out] = 0.0
     return frozen(held.reshape(matrix.shape))
+
+
+@lru_cache(maxsize=64)
+def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
+    made = _sampling if len(times) // 8 * n <= KEPT else _sampling.__wrapped__
+    t_end = t_start + (n - degree) * spacing
+    return hold_ends(times, t_start, t_end, lambda offsets: made(offsets, n, degree, spacing))
 
 
 @lru_cache(maxsize=64)
@@ -176,7 +193,7 @@ class UniformBSpline:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
-        made = _sampling_at if len(times) * len(self.points) <= _KEPT else _sampling_at.__wrapped__
+        made = _sampling_at if len(times) * len(self.points) <= KEPT else _sampling_at.__wrapped__
         matrix = made(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
@@ -236,7 +253,7 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     Position, velocity and acceleration at ``t_start`` are reproduced exactly (and the jerk for
     degree 4 and up); the remaining control points fit the positions.
     """
-    if isinstance(curve, UniformBSpline) and 4 * n * len(curve.points) <= _KEPT:
+    if isinstance(curve, UniformBSpline) and 4 * n * len(curve.points) <= KEPT:
         # Linear in the curve's control points, and searches ask for the same times over and over.
         since = round(t_start - curve.t_start, 12)
         fit = _refit_operator(since, len(curve.points), curve.degree, curve.spacing, n, degree, spacing)

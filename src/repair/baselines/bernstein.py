@@ -15,6 +15,7 @@ from math import comb, factorial
 import numpy as np
 import numpy.typing as npt
 
+from repair.bspline import KEPT, hold_ends
 from repair.types import Array, FrenetTrajectory, frozen
 
 __all__ = ["BernsteinCurve", "QpStructure", "bernstein_basis", "qp_structure"]
@@ -64,25 +65,19 @@ class BernsteinCurve:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        since = times - self.t_start
-        tau = np.minimum(np.maximum(since, 0.0), self.t_end - self.t_start)
         pieces, width, _ = self.points.shape
-        # Probes ask for the same offsets over and over; the matrices are worth keeping.
-        matrix = _sampling(np.round(tau, 12).tobytes(), pieces, width - 1, self.duration)
-        stacked = (matrix @ self.points.reshape(pieces * width, 2)).reshape(4, len(times), 2)
-        position, velocity, acceleration, jerk = stacked
-        beyond = since - tau
-        out = np.abs(beyond) > 1e-9
-        if out.any():
-            position[out] += beyond[out, None] * velocity[out]
-            acceleration[out] = 0.0
-            jerk[out] = 0.0
+        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
+        made = _sampling_at if len(times) * pieces * width <= KEPT else _sampling_at.__wrapped__
+        matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
+        # By columns: two long products, and s and l lie in one piece each.
+        columns = self.points.reshape(pieces * width, 2).T @ matrix
+        position, velocity, acceleration, jerk = columns.reshape(2, 4, -1).transpose(1, 2, 0)
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
-    """Values (4 K, N) of position to jerk at the ``offsets`` since the start."""
+    """Values (N, 4 K) of position to jerk at the ``offsets`` since the start."""
     tau = np.frombuffer(offsets) / duration
     piece = np.clip(np.floor(tau + 1e-9), 0, pieces - 1).astype(np.intp)
     u = np.clip(tau - piece, 0.0, 1.0)
@@ -91,7 +86,14 @@ def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Arra
         rows[order, np.arange(len(tau)), piece] = bernstein_basis(u, degree - order) @ _derivative(
             1, degree, duration, order
         )
-    return frozen(rows.reshape(4 * len(tau), -1))
+    return frozen(np.ascontiguousarray(rows.reshape(4 * len(tau), -1).T))
+
+
+@lru_cache(maxsize=64)
+def _sampling_at(times: bytes, t_start: float, pieces: int, degree: int, duration: float) -> Array:
+    made = _sampling if len(times) // 8 * pieces * (degree + 1) <= KEPT else _sampling.__wrapped__
+    t_end = t_start + pieces * duration
+    return hold_ends(times, t_start, t_end, lambda offsets: made(offsets, pieces, degree, duration))
 
 
 @dataclass(frozen=True)
