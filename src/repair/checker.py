@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from repair.collision import CollisionWorld, Contact, official_shifts
 from repair.config import CheckerConfig
+from repair.extremes import largest, smallest
 from repair.kinematics import (
     DrivenStates,
     body_angles,
@@ -284,8 +285,8 @@ class Checker:
         speed = path.speed[since:]
         change = speed[1:] - speed[:-1]
         rate = 1.0 / float(path.t[1] - path.t[0])
-        v_high = float(np.maximum.reduce(speed))
-        a_low, a_high = float(np.minimum.reduce(change)), float(np.maximum.reduce(change))
+        v_high = largest(speed)
+        a_low, a_high = smallest(change), largest(change)
         lateral = max(-path.slowest, v_high) * path.sharpest
         return (
             path.slowest >= -STANDSTILL

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from repair.extremes import smallest
 from repair.types import Array
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ def body_angles(path: CartesianPath, vehicle: Vehicle, slip0: float | None = Non
 def _angles(
     heading: Array, speed: Array, step: Array, turn: Array, slowest: float, rear: float, slip0: float | None
 ) -> tuple[Array, Array]:
-    if len(step) and np.minimum.reduce(step) > _MOVES:
+    if len(step) and smallest(step) > _MOVES:
         if not slowest > 0.0:
             step = np.copysign(step, speed[1:] + speed[:-1])
         slip = _slip_angle(turn, step, step, rear, slip0)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from repair.extremes import largest
 from repair.types import Array, Limits, frozen
 
 __all__ = ["Bends", "Rollouts", "speed_profiles"]
@@ -145,7 +146,7 @@ class Bends:
         """
         speeds, (where, kappa) = self.speeds, self.curvature
         first, last = where.searchsorted((speeds.s[0, p], speeds.s[-1, p])).tolist()
-        sharpest = float(np.maximum.reduce(np.abs(kappa[max(first - 1, 0) : last + 1])))
+        sharpest = largest(np.abs(kappa[max(first - 1, 0) : last + 1]))
         rate = float(speeds.family.rate[p])
         highest = speeds.v0 + max(rate * float(speeds.ramp[-1, p]), 0.0)
         # A little more than the true numbers, which are rounded in another order.

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.errors import ScenarioError
+from repair.extremes import largest, smallest
 from repair.types import Array, FrenetTrajectory, frozen
 
 __all__ = ["STANDSTILL", "CartesianPath", "FrenetFrame"]
@@ -73,11 +74,11 @@ class CartesianPath(NamedTuple):
         turn = heading[1:] - heading[:-1]
         longest = sharpest = 0.0
         if len(step):
-            longest, sharpest = float(np.maximum.reduce(step)), float(np.maximum.reduce(np.abs(turn)))
+            longest, sharpest = largest(step), largest(np.abs(turn))
             if not sharpest < np.pi:
                 heading = np.unwrap(heading)
                 turn = heading[1:] - heading[:-1]
-                sharpest = float(np.maximum.reduce(np.abs(turn)))
+                sharpest = largest(np.abs(turn))
         xy = plane.view(np.float64).reshape(-1, 2)
         return cls(t, xy, heading, speed, step, turn, slowest, longest, sharpest)
 
@@ -358,7 +359,7 @@ class FrenetFrame:
 
 
 def _least(values: Array) -> float:
-    return float(np.minimum.reduce(values)) if len(values) else np.inf
+    return smallest(values) if len(values) else np.inf
 
 
 def _aside(plane: Points, tangent: Array, second: Array, l: Array) -> Array:  # noqa: E741
