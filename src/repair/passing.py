@@ -353,7 +353,7 @@ def _passing(
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
     sides = partial(sides_of, guide.position, boxes.lower, boxes.upper)
-    return Passing.found(maneuver, guide, sides, cost, cost < _SHUT)
+    return Passing(maneuver, guide, sides, cost, cost < _SHUT)
 
 
 def sides_of(position: Array, lower: Array, upper: Array) -> npt.NDArray[np.int8]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -267,8 +267,8 @@ class Passing:
     maneuver : Maneuver
     guide : FrenetTrajectory
         The coarse trajectory that shows the way; an initial guess, not a result.
-    side : (N, K) int array
-        :class:`Side` of every obstacle at each guide time (constant between guide times).
+    sides : (N, K) int array, or callable
+        What ``side`` is; or makes it, if it is asked for: many backends take the guide alone.
     cost : float
         The guide's cost; smaller is gentler.
     open : bool
@@ -277,31 +277,14 @@ class Passing:
 
     maneuver: Maneuver
     guide: FrenetTrajectory
-    side: npt.NDArray[np.int8]
+    sides: npt.NDArray[np.int8] | Callable[[], npt.NDArray[np.int8]]
     cost: float
     open: bool = True
 
-    @classmethod
-    def found(
-        cls,
-        maneuver: Maneuver,
-        guide: FrenetTrajectory,
-        sides: Callable[[], npt.NDArray[np.int8]],
-        cost: float,
-        open: bool = True,
-    ) -> Passing:
-        """One whose ``side`` is made by ``sides`` if it is asked for: most backends take the guide alone."""
-        passing = cls.__new__(cls)
-        passing.__dict__.update(maneuver=maneuver, guide=guide, cost=cost, open=open, _sides=sides)
-        return passing
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name):
-            """The sides, the first time; whatever is known is found without coming here."""
-            if name != "side" or "_sides" not in self.__dict__:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            return self.__dict__.setdefault("side", self._sides())
+    @cached_property
+    def side(self) -> npt.NDArray[np.int8]:
+        """:class:`Side` of every obstacle at each guide time (N, K); constant between guide times."""
+        return self.sides() if callable(self.sides) else self.sides
 
     def side_at(self, times: npt.ArrayLike) -> npt.NDArray[np.int8]:
         """Side of every obstacle (N, K') at ``times``: that of the nearest guide time."""

@@ -317,7 +317,7 @@ def test_two_obstacles_without_a_gap_are_named():
     bare = problems.forced(toy.problem(boxes, lateral=False, t_end=3.0))
     side = bare.passing.side.copy()
     side[1] = Side.AHEAD
-    result = CasadiBackend().solve(replace(bare, passing=replace(bare.passing, side=side)))
+    result = CasadiBackend().solve(replace(bare, passing=replace(bare.passing, sides=side)))
     assert result.status is SolveStatus.INFEASIBLE
     assert "obstacle 10" in result.detail
 
