@@ -177,15 +177,6 @@ class CollisionWorld:
         change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(weight > 0.0, left + weight * change, left)
 
-    def first_collision(
-        self, x: Array, y: Array, orientation: Array, start: int = 0
-    ) -> tuple[float, int] | None:
-        """Time [s] and obstacle id of the first collision, or None; arguments as in :meth:`contact`."""
-        found = self._first(_complex(x, y), orientation, start)
-        if found is None:
-            return None
-        return (start + found[0]) * self.dt / self.substeps, self._obstacles[found[1]].id
-
     def contact(self, x: Array, y: Array, orientation: Array, start: int = 0) -> Contact | None:
         """First contact of the ego's rectangle with an obstacle.
 

@@ -145,15 +145,11 @@ def first_entry(occupancy: Occupancy, trajectory: FrenetTrajectory) -> tuple[int
     return sample, int(np.argmax(inside[:, sample]))
 
 
-def relevant(
-    occupancy: Occupancy, start: Array, t_start: float, t_end: float, reach: Array, l_room: Array
-) -> Occupancy:
+def relevant(occupancy: Occupancy, t_start: float, t_end: float, reach: Array, l_room: Array) -> Occupancy:
     """The obstacles that the ego could touch between two times.
 
     Parameters
     ----------
-    start : (3, 2) array
-        State at ``t_start``.
     reach : (2,) array
         Smallest and largest s the ego can be at until ``t_end`` [m].
     l_room : (2,) array

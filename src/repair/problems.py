@@ -181,7 +181,7 @@ class ProblemFactory:
     def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:
         sideways = reference[:, 1]
         reach, room = self._reach(start, t_rep, float(sideways.min()), float(sideways.max()), lateral)
-        return relevant(self.occupancy, start, t_rep, self.t_end, np.array(reach), np.array(room))
+        return relevant(self.occupancy, t_rep, self.t_end, np.array(reach), np.array(room))
 
     def _reach(
         self, start: Array, t_rep: float, rightmost: float, leftmost: float, lateral: bool

@@ -119,10 +119,6 @@ class RoadBoundary:
         known[pose[:, inside] if not inside.all() else slice(None)] = True
         return known
 
-    def starts_off_road(self, x: float, y: float, orientation: float) -> bool:
-        """Whether the ego is off the road already at this pose."""
-        return self.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
-
     def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
         """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
         cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]

@@ -39,6 +39,17 @@ def moving(x0, y0, vx, vy, heading, n=10, dt=0.1, size=(2.0, 1.0)):
     return np.column_stack((x0 + vx * t, y0 + vy * t, np.full(n + 1, heading), np.tile(size, (n + 1, 1))))
 
 
+def first_collision(world, *poses, start=0):
+    """Time and obstacle of the first contact."""
+    contact = world.contact(*poses, start)
+    return None if contact is None else (contact.time, contact.obstacle_id)
+
+
+def off_road(boundary, x, y, orientation):
+    """Whether the ego is off the road at a pose."""
+    return boundary.first_off_road(np.array([x]), np.array([y]), np.array([orientation])) is not None
+
+
 def at_rest(n=41):
     return np.zeros(n), np.zeros(n), np.zeros(n)
 
@@ -89,7 +100,7 @@ def test_polygons_as_in_shapely():
 def test_nothing_there():
     world = CollisionWorld([], EGO, 0.1, 10)
     assert world.n_samples == 41
-    assert world.first_collision(*at_rest()) is None
+    assert first_collision(world, *at_rest()) is None
     assert world.contact(*at_rest()) is None
 
 
@@ -97,7 +108,7 @@ def test_first_contact_in_time_and_who():
     far = obstacle(moving(30.0, 0.0, -20.0, 0.0, np.pi), id=7)
     near = obstacle(moving(20.0, 0.0, -20.0, 0.0, np.pi), id=8)
     world = CollisionWorld([far, near], EGO, 0.1, 10)
-    time, who = world.first_collision(*at_rest())
+    time, who = first_collision(world, *at_rest())
     gap = 20.0 - 2.0 - HALF[0]
     assert who == 8
     assert gap / 20.0 <= time < gap / 20.0 + 0.025 + 1e-9
@@ -108,34 +119,36 @@ def test_a_contact_between_two_steps_is_seen():
     # crosses 2.5 m in front of and behind the ego at the steps, through it in between
     rows = moving(0.0, -5.0, 0.0, 50.0, np.pi / 2, n=2, dt=0.2, size=(0.3, 0.3))
     world = CollisionWorld([obstacle(rows)], EGO, 0.2, 2)
-    assert world.first_collision(*at_rest(9)) == (pytest.approx(0.1), 1)
+    assert first_collision(world, *at_rest(9)) == (pytest.approx(0.1), 1)
     coarse = CollisionWorld([obstacle(rows)], EGO, 0.2, 2, substeps=1)
-    assert coarse.first_collision(*at_rest(3)) is None
+    assert first_collision(coarse, *at_rest(3)) is None
 
 
 def test_heading_is_interpolated_the_short_way():
     rows = np.array([[0.0, 3.2, np.pi - 0.1, 2.0, 0.1], [0.0, 3.2, -np.pi + 0.1, 2.0, 0.1]])
     world = CollisionWorld([obstacle(rows)], EGO, 0.1, 1)
-    assert world.first_collision(*at_rest(5)) is None  # through pi; through zero it would stand upright
+    assert first_collision(world, *at_rest(5)) is None  # through pi; through zero it would stand upright
 
 
 def test_absent_means_absent():
     rows = np.tile([0.0, 0.0, 0.0, 2.0, 1.0], (11, 1))
     rows[:3] = rows[6:] = np.nan
     world = CollisionWorld([obstacle(rows)], EGO, 0.1, 10)
-    assert world.first_collision(*at_rest()) == (pytest.approx(0.3), 1)
+    assert first_collision(world, *at_rest()) == (pytest.approx(0.3), 1)
     poses = tuple(a[21:] for a in at_rest())
-    assert world.first_collision(*poses, start=21) is None
-    assert world.first_collision(*poses, start=20) == (pytest.approx(0.5), 1)
+    assert first_collision(world, *poses, start=21) is None
+    assert first_collision(world, *poses, start=20) == (pytest.approx(0.5), 1)
 
 
 def test_circles():
     rows = moving(10.0, 0.0, -10.0, 0.0, 0.0, size=(0.5, 0.5))
     world = CollisionWorld([obstacle(rows, kind="circle")], EGO, 0.1, 10)
-    time, _ = world.first_collision(*at_rest())
+    time, _ = first_collision(world, *at_rest())
     assert time == pytest.approx((10.0 - 0.5 - HALF[0]) / 10.0, abs=0.025)
     corner = np.tile([HALF[0] + 0.4, HALF[1] + 0.4, 0.0, 0.5, 0.5], (11, 1))
-    assert CollisionWorld([obstacle(corner, kind="circle")], EGO, 0.1, 10).first_collision(*at_rest()) is None
+    assert (
+        first_collision(CollisionWorld([obstacle(corner, kind="circle")], EGO, 0.1, 10), *at_rest()) is None
+    )
 
 
 def test_polygons_and_sets_hold_over_both_intervals():
@@ -144,18 +157,18 @@ def test_polygons_and_sets_hold_over_both_intervals():
     polygons = tuple((square + 50.0, square) if k == 5 else (square + 50.0,) for k in range(11))
     shape = obstacle(rows, role="set_based", kind="polygon", polygons=polygons)
     world = CollisionWorld([shape], EGO, 0.1, 10)
-    assert world.first_collision(*at_rest()) == (pytest.approx(0.425), 1)
+    assert first_collision(world, *at_rest()) == (pytest.approx(0.425), 1)
     later = tuple(a[24:] for a in at_rest())
-    assert world.first_collision(*later, start=24) is None
+    assert first_collision(world, *later, start=24) is None
     rows[5] = (0.0, 0.0, 0.0, 1.0, 1.0)
     world = CollisionWorld([obstacle(rows, role="set_based")], EGO, 0.1, 10)
-    assert world.first_collision(*at_rest()) == (pytest.approx(0.425), 1)
+    assert first_collision(world, *at_rest()) == (pytest.approx(0.425), 1)
 
 
 def test_a_polygon_far_inside_its_circle_is_no_contact():
     sliver = np.array([[-20.0, 5.0], [20.0, 5.0], [20.0, 5.1]])
     shape = obstacle(np.full((11, 5), np.nan), kind="polygon", polygons=((sliver,),) * 11)
-    assert CollisionWorld([shape], EGO, 0.1, 10).first_collision(*at_rest()) is None
+    assert first_collision(CollisionWorld([shape], EGO, 0.1, 10), *at_rest()) is None
 
 
 def test_late_copies_for_the_drivability_checker():
@@ -164,11 +177,11 @@ def test_late_copies_for_the_drivability_checker():
     gone = obstacle(rows)
     poses = tuple(a[9:] for a in at_rest())
     on_time = CollisionWorld([gone], EGO, 0.1, 10)
-    assert on_time.first_collision(*poses, start=9) is None
+    assert first_collision(on_time, *poses, start=9) is None
     late = CollisionWorld([gone], EGO, 0.1, 10, shifts={1: 1})
-    assert late.first_collision(*poses, start=9) == (pytest.approx(0.3), 1)
+    assert first_collision(late, *poses, start=9) == (pytest.approx(0.3), 1)
     static = CollisionWorld([replace(gone, role="static")], EGO, 0.1, 10, shifts={1: 1})
-    assert static.first_collision(*poses, start=9) is None
+    assert first_collision(static, *poses, start=9) is None
 
 
 def test_shifts_are_read_from_the_predictions():
@@ -254,17 +267,17 @@ def test_on_and_off_the_road():
 def test_touching_the_edge_is_off_the_road():
     boundary = two_way()
     edge = 3.0 - HALF[1]
-    assert boundary.starts_off_road(20.0, edge, 0.0)
-    assert not boundary.starts_off_road(20.0, edge - 1e-6, 0.0)
+    assert off_road(boundary, 20.0, edge, 0.0)
+    assert not off_road(boundary, 20.0, edge - 1e-6, 0.0)
 
 
 def test_neighbours_that_do_not_agree():
     """A neighbour that is not in the file, or two lanelets each left of the other, do no harm."""
     missing = lanelet(1, [(0, 0), (40, 0)], [(0, -3), (40, -3)], adj_left=99, adj_left_same_direction=True)
-    assert not road(missing).starts_off_road(20.0, -1.5, 0.0)
+    assert not off_road(road(missing), 20.0, -1.5, 0.0)
     one = lanelet(1, [(0, 0), (40, 0)], [(0, -3), (40, -3)], adj_left=2, adj_left_same_direction=True)
     two = lanelet(2, [(0, 3), (40, 3)], [(0, 0), (40, 0)], adj_left=1, adj_left_same_direction=True)
-    assert road(one, two).starts_off_road(20.0, -4.5, 0.0)
+    assert off_road(road(one, two), 20.0, -4.5, 0.0)
 
 
 # ------------------------------------------------- against the drivability checker
@@ -310,7 +323,7 @@ def test_no_collision_of_the_drivability_checker_is_missed(scenarios):
                 ego.append_obstacle(RectOBB(*HALF, heading[k], x[k], y[k]))
             official = checker.collide(ego)
             seen += official
-            assert not official or world.first_collision(x, y, heading) is not None, path.name
+            assert not official or world.contact(x, y, heading) is not None, path.name
     assert seen > 50
 
 
@@ -337,4 +350,4 @@ def test_no_pose_is_laxer_than_the_triangulated_boundary(scenarios):
 def test_the_start_is_on_the_road(scenarios):
     for path in samples_of(scenarios, 6)[:6]:
         scenario, start = read(path)
-        assert not RoadBoundary(scenario, EGO).starts_off_road(*start.position, start.orientation), path.name
+        assert not off_road(RoadBoundary(scenario, EGO), *start.position, start.orientation), path.name

@@ -105,7 +105,7 @@ def test_no_obstacles_is_no_error():
     assert len(boxes) == 0
     assert notes == ()
     assert first_entry(boxes, path([0.0, 1.0], 5.0, 0.0)) is None
-    assert len(relevant(boxes, np.zeros((3, 2)), 0.0, 1.0, np.array([0.0, 1.0]), np.array([0.0, 1.0]))) == 0
+    assert len(relevant(boxes, 0.0, 1.0, np.array([0.0, 1.0]), np.array([0.0, 1.0]))) == 0
 
 
 def test_absence_is_nan_and_not_noted():
@@ -287,7 +287,7 @@ def test_culling_keeps_whatever_the_ego_could_touch(rows, t_start, duration, dat
     )
     reach, room = np.array([0.0, 40.0]), np.array([-2.0, 2.0])
     t_end = t_start + duration
-    kept = set(relevant(boxes, np.zeros((3, 2)), t_start, t_end, reach, room).ids.tolist())
+    kept = set(relevant(boxes, t_start, t_end, reach, room).ids.tolist())
     share = data.draw(
         st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=30)
     )
@@ -308,14 +308,14 @@ def test_culling_sees_a_box_that_cuts_the_corner_between_two_steps():
     boxes = Occupancy(frozen([0.0, 0.1]), np.array([1]), frozen(lower), frozen(upper), np.array([False]))
     reach, room = np.array([0.0, 40.0]), np.array([-2.0, 2.0])
     assert first_entry(boxes, path(0.05, 0.1, 1.9)) == (0, 0)
-    assert len(relevant(boxes, np.zeros((3, 2)), 0.0, 0.1, reach, room)) == 1
+    assert len(relevant(boxes, 0.0, 0.1, reach, room)) == 1
 
 
 def test_culling_looks_at_the_step_after_an_end_between_steps():
     boxes = toy.occupancy(toy.box((20.0, 24.0), (2.5, 4.0), v=(0.0, -10.0)), duration=3.0)
     reach, room = np.array([0.0, 40.0]), np.array([-2.0, 2.0])
     assert first_entry(boxes, path(0.09, 22.0, 1.95)) == (0, 0)
-    assert len(relevant(boxes, np.zeros((3, 2)), 0.0, 0.09, reach, room)) == 1
+    assert len(relevant(boxes, 0.0, 0.09, reach, room)) == 1
 
 
 def test_culling_drops_what_is_out_of_reach():
@@ -326,7 +326,7 @@ def test_culling_drops_what_is_out_of_reach():
         toy.box((10.0, 20.0), (-1.0, 1.0)),
         duration=3.0,
     )
-    kept = relevant(boxes, np.zeros((3, 2)), 0.0, 2.0, np.array([0.0, 40.0]), np.array([-2.0, 2.0]))
+    kept = relevant(boxes, 0.0, 2.0, np.array([0.0, 40.0]), np.array([-2.0, 2.0]))
     assert kept.ids.tolist() == [103]
 
 
@@ -344,7 +344,7 @@ def test_culling_keeps_whatever_comes_near_within_any_interval():
         occupancy = toy.occupancy(*boxes, duration=3.0)
         begin, end = np.sort(rng.uniform(0.0, 3.0, 2)) if rng.random() < 0.5 else (0.5, 3.0)
         reach, room = np.sort(rng.uniform(-10.0, 40.0, 2)), np.sort(rng.uniform(-6.0, 6.0, 2))
-        kept = set(relevant(occupancy, np.zeros((3, 2)), begin, end, reach, room).ids.tolist())
+        kept = set(relevant(occupancy, begin, end, reach, room).ids.tolist())
         for t in np.linspace(begin, end, 101):
             lower, upper = (box[:, 0] for box in occupancy.at([t]))
             met = (upper[:, 0] > reach[0]) & (lower[:, 0] < reach[1])
