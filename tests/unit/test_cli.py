@@ -349,6 +349,7 @@ def test_a_start_that_is_not_finite(
         (["run", "--set", "search.delta=0.1"], ("search.delta", "did you mean 'search.delta_t'")),
         (["run", "--set", "search.delta_t=fast"], ("search.delta_t", "fast")),
         (["run", "--set", "search.delta_t=-1"], ("search.delta_t", "must lie in")),
+        (["run", "--set", "ego.deform.collision=-1"], ("ego.deform.collision", "must lie in")),
         (["run", "--set", "search.delta_t=.nan"], ("search.delta_t", "finite")),
         (["run", "--set", "search.rule=guess"], ("search.rule", "bisect, guided, scan, as_printed")),
         (["run", "--set", "delta_t"], ("'delta_t'", "key=value")),
