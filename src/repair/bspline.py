@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, comb, factorial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,11 +21,12 @@ import numpy.typing as npt
 from repair.types import Array, Curve, FrenetTrajectory, frozen
 
 __all__ = [
-    "KEPT",
+    "DENSE",
     "UniformBSpline",
     "basis_matrix",
     "bernstein_matrix",
     "derivative_matrix",
+    "evaluated",
     "fit_to_curve",
     "hold_ends",
     "n_points_for",
@@ -84,19 +86,26 @@ def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order:
     tau : (K,) array_like
         Times since ``t_start`` [s]; values outside of the span use the outermost polynomial.
     """
+    segment, local = _local_basis(tau, n, degree, spacing, order)
+    matrix = np.zeros((len(segment), n))
+    np.put_along_axis(matrix, segment[:, None] + np.arange(degree + 1), local, axis=1)
+    return matrix
+
+
+def _local_basis(
+    tau: npt.ArrayLike, n: int, degree: int, spacing: float, order: int
+) -> tuple[npt.NDArray[np.intp], Array]:
+    """The segment (K,) of each time, and the values (K, p + 1) of the basis functions alive there."""
     where = np.asarray(tau, dtype=np.float64) / spacing
     segment = np.clip(np.floor(where + 1e-9), 0, n - degree - 1).astype(np.intp)
     u = where - segment
     powers = np.zeros((len(u), degree + 1))
     for k in range(order, degree + 1):
         powers[:, k] = factorial(k) / factorial(k - order) * u ** (k - order)
-    local = powers @ segment_matrix(degree) / spacing**order
-    matrix = np.zeros((len(u), n))
-    np.put_along_axis(matrix, segment[:, None] + np.arange(degree + 1), local, axis=1)
-    return matrix
+    return segment, powers @ segment_matrix(degree) / spacing**order
 
 
-KEPT = 40_000  #: times * points of the largest sampling matrix that is kept: 1.3 MB
+DENSE = 3000  #: times * points up to which a dense sampling matrix is faster than a sparse one
 
 
 @lru_cache(maxsize=64)
@@ -135,10 +144,36 @@ def hold_ends(times: bytes, t_start: float, t_end: float, values: Callable[[byte
 
 
 @lru_cache(maxsize=64)
-def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
-    made = _sampling if len(times) // 8 * n <= KEPT else _sampling.__wrapped__
+def _sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Any:
+    """The matrix for :func:`evaluated`; sparse where it is large: any time sees p + 1 control points only."""
     t_end = t_start + (n - degree) * spacing
-    return hold_ends(times, t_start, t_end, lambda offsets: made(offsets, n, degree, spacing))
+    if len(times) // 8 * n <= DENSE:
+        return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
+    from scipy.sparse import csr_array
+
+    segments: list[npt.NDArray[np.intp]] = []
+
+    def alive(offsets: bytes) -> Array:
+        parts = [_local_basis(np.frombuffer(offsets), n, degree, spacing, k) for k in range(4)]
+        segments.append(parts[0][0])
+        return np.concatenate([local for _, local in parts]).T
+
+    weights = hold_ends(times, t_start, t_end, alive).T
+    columns = np.tile(segments[0][:, None] + np.arange(degree + 1), (4, 1))
+    rows = np.arange(0, weights.size + 1, degree + 1)
+    return csr_array((weights.ravel(), columns.ravel(), rows), shape=(len(weights), n))
+
+
+def evaluated(matrix: Any, points: Array) -> Array:
+    """Position and three derivatives (4, K, d) of control points (n, d).
+
+    Parameters
+    ----------
+    matrix : (n, 4 K) array or (4 K, n) sparse array
+    """
+    if isinstance(matrix, np.ndarray):  # by columns: two long products, and s and l lie in one piece each
+        return np.asarray((points.T @ matrix).reshape(points.shape[1], 4, -1).transpose(1, 2, 0))
+    return np.asarray((matrix @ points).reshape(4, -1, points.shape[1]))
 
 
 @lru_cache(maxsize=64)
@@ -192,13 +227,11 @@ class UniformBSpline:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
-        made = _sampling_at if len(times) * len(self.points) <= KEPT else _sampling_at.__wrapped__
-        matrix = made(
+        # Probes ask for the same times over and over; the matrices are worth keeping.
+        matrix = _sampling_at(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
-        # By columns: two long products, and s and l lie in one piece each.
-        position, velocity, acceleration, jerk = (self.points.T @ matrix).reshape(2, 4, -1).transpose(1, 2, 0)
+        position, velocity, acceleration, jerk = evaluated(matrix, self.points)
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 
@@ -241,7 +274,8 @@ def _refit_operator(
 ) -> Array:
     """Map (n, points) from a spline's control points to those of its fit from ``since`` its start on."""
     tau, fitted, begin = _fit_operator(n, new_degree, new_spacing, 4)
-    samples = _sampling_at((since + tau).tobytes(), 0.0, points, degree, spacing).T.reshape(4, -1, points)
+    matrix = _sampling_at((since + tau).tobytes(), 0.0, points, degree, spacing)
+    samples = evaluated(matrix, np.eye(points))
     state = np.zeros((max(new_degree, 4), points))
     state[:4] = samples[:, 0]
     return frozen(fitted @ samples[0] + begin @ state[:new_degree])
@@ -253,7 +287,7 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     Position, velocity and acceleration at ``t_start`` are reproduced exactly (and the jerk for
     degree 4 and up); the remaining control points fit the positions.
     """
-    if isinstance(curve, UniformBSpline) and 4 * n * len(curve.points) <= KEPT:
+    if isinstance(curve, UniformBSpline):
         # Linear in the curve's control points, and searches ask for the same times over and over.
         since = round(t_start - curve.t_start, 12)
         fit = _refit_operator(since, len(curve.points), curve.degree, curve.spacing, n, degree, spacing)

@@ -11,11 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb, factorial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from repair.bspline import KEPT, hold_ends
+from repair.bspline import DENSE, evaluated, hold_ends
 from repair.types import Array, FrenetTrajectory, frozen
 
 __all__ = ["BernsteinCurve", "QpStructure", "bernstein_basis", "qp_structure"]
@@ -66,16 +67,12 @@ class BernsteinCurve:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         pieces, width, _ = self.points.shape
-        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
-        made = _sampling_at if len(times) * pieces * width <= KEPT else _sampling_at.__wrapped__
-        matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
-        # By columns: two long products, and s and l lie in one piece each.
-        columns = self.points.reshape(pieces * width, 2).T @ matrix
-        position, velocity, acceleration, jerk = columns.reshape(2, 4, -1).transpose(1, 2, 0)
+        # Probes ask for the same times over and over; the matrices are worth keeping.
+        matrix = _sampling_at(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
+        position, velocity, acceleration, jerk = evaluated(matrix, self.points.reshape(pieces * width, 2))
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 
-@lru_cache(maxsize=64)
 def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
     """Values (N, 4 K) of position to jerk at the ``offsets`` since the start."""
     tau = np.frombuffer(offsets) / duration
@@ -90,10 +87,15 @@ def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Arra
 
 
 @lru_cache(maxsize=64)
-def _sampling_at(times: bytes, t_start: float, pieces: int, degree: int, duration: float) -> Array:
-    made = _sampling if len(times) // 8 * pieces * (degree + 1) <= KEPT else _sampling.__wrapped__
+def _sampling_at(times: bytes, t_start: float, pieces: int, degree: int, duration: float) -> Any:
+    """The matrix for :func:`repair.bspline.evaluated`; sparse where it is large."""
     t_end = t_start + pieces * duration
-    return hold_ends(times, t_start, t_end, lambda offsets: made(offsets, pieces, degree, duration))
+    matrix = hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, pieces, degree, duration))
+    if matrix.size <= 4 * DENSE:
+        return matrix
+    from scipy.sparse import csr_array
+
+    return csr_array(matrix.T)
 
 
 @dataclass(frozen=True)

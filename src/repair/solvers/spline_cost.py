@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ _ORDERS = (1, 2, 3)
 # Up to this many entries one dense matrix makes everything that is bounded: on small problems calls are what
 # time is spent on. Beyond, the axes are kept apart and -x and the pairs are not multiplied out.
 _DENSE = 6000
+_SPARSE = 100  # With more control points than this, most entries of a dense map of one axis are zeros.
 _NONE, _NOTHING = np.empty(0, dtype=np.intp), np.empty(0)
 
 
@@ -38,8 +39,9 @@ class _Structure:
     form of LAPACK, column by column: entry (r, c) with r >= c at ``c * (width + 1) + r - c``.
     """
 
-    stack: Array  # (3n - 6, n): control points of one axis to [V; A; J]
-    free: Array  # (3n - 6, m): the columns of the free ones
+    stack: Any  # (3n - 6, n): control points of one axis to [V; A; J]
+    free: Any  # (3n - 6, m): the columns of the free ones
+    back: Any  # (m, 3n - 6): transposed
     smooth: Array  # ((3n - 6) axes,): curvature of lambda_s J_s by every row
     width: int  # of the band
     band: Array  # ((m axes) * (width + 1),): Hessian of lambda_s J_s
@@ -68,13 +70,17 @@ def _structure(
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     factors = frozen(factor.reshape(-1, 10))
     band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
-    free, dense = frozen(stack[:, first:last]), None
-    if 2 * free.size * axes**2 <= _DENSE:
-        x = np.kron(free, np.eye(axes))
-        dense = frozen(np.concatenate((x, -x)))
-    entries = where.reshape(-1, 10)
+    entries, dense = where.reshape(-1, 10), None
     entries.setflags(write=False)
-    return _Structure(frozen(stack), free, frozen(smooth), width, frozen(band), factors, entries, dense)
+    if 2 * len(stack) * size * axes <= _DENSE:
+        x = np.kron(stack[:, first:last], np.eye(axes))
+        dense = frozen(np.concatenate((x, -x)))
+    maps = (frozen(stack), frozen(stack[:, first:last]), frozen(stack[:, first:last].T))
+    if n > _SPARSE:
+        from scipy.sparse import csr_array
+
+        maps = tuple(csr_array(m) for m in maps)
+    return _Structure(*maps, frozen(smooth), width, frozen(band), factors, entries, dense)
 
 
 class Point(NamedTuple):
@@ -183,7 +189,7 @@ class SplineCost:
             return np.asarray(slope.dot(self._matrix))
         rows = self._rows
         bent = slope[:rows] - slope[rows : 2 * rows]
-        gradient = self._structure.free.T.dot(bent.reshape(-1, self.axes)).ravel()
+        gradient = self._structure.back.dot(bent.reshape(-1, self.axes)).ravel()
         gradient += np.bincount(self._coordinate, self._sign * slope[2 * rows :], self.size)
         return np.asarray(gradient)
 
@@ -193,7 +199,7 @@ class SplineCost:
         None where the quadratic part has no unique minimum.
         """
         bent = self._structure.smooth * self._derivatives
-        slope = self._structure.free.T.dot(bent.reshape(-1, self.axes)).ravel()
+        slope = self._structure.back.dot(bent.reshape(-1, self.axes)).ravel()
         factor, failed = dpbtrf(self.quadratic(), lower=1)
         return None if failed else -np.asarray(dpbtrs(factor, slope, lower=1)[0])
 
