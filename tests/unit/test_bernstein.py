@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
+from repair.baselines import bernstein
 from repair.baselines.bernstein import BernsteinCurve, bernstein_basis, qp_structure
 from repair.types import Curve, frozen
 
@@ -49,6 +51,20 @@ def test_a_line_has_its_own_values_as_control_points():
     curve = BernsteinCurve(0.0, 0.4, np.stack([2.0 + 3.0 * structure.times] * 2, axis=1).reshape(3, 6, 2))
     t = np.linspace(0.0, 1.2, 20)
     np.testing.assert_allclose(curve.sample(t).position[:, 0], 2.0 + 3.0 * t, atol=1e-12)
+
+
+def test_large_samplings_are_sparse_and_the_same(monkeypatch):
+    curve, t = chain(4, pieces=9), np.linspace(0.7, 6.0, 200)
+    sampled = []
+    for size, kind in ((0, csr_array), (10**9, np.ndarray)):
+        monkeypatch.setattr(bernstein, "DENSE", size)
+        bernstein._sampling_at.cache_clear()
+        assert isinstance(bernstein._sampling_at(t.tobytes(), 1.0, 9, 5, 0.5), kind)
+        sampled.append(curve.sample(t))
+    bernstein._sampling_at.cache_clear()
+    for name in ("position", "velocity", "acceleration", "jerk"):
+        one, other = (getattr(each, name) for each in sampled)
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
 
 
 def test_beyond_the_span_the_end_speed_is_held():

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from benchmarks import literal
 from scipy.interpolate import BSpline
+from scipy.sparse import csr_array
 
+from repair import bspline
 from repair.bspline import (
     UniformBSpline,
     basis_matrix,
@@ -189,6 +191,24 @@ def test_fit_of_a_parabola_is_the_parabola_up_to_the_last_control_point():
     t = np.linspace(1.0, fitted.t_end, 80)
     np.testing.assert_allclose(fitted.sample(t).position, profile.sample(t).position, atol=1e-6)
     np.testing.assert_allclose(fitted.derivative_points(2)[:, 0], -2.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_large_samplings_are_sparse_and_the_same(monkeypatch, degree):
+    spline = random_spline(degree, seed=12, n=degree + 40)
+    t = np.linspace(spline.t_start - 0.5, spline.t_end + 0.7, 333)
+    sampled = []
+    for size, kind in ((0, csr_array), (10**9, np.ndarray)):
+        monkeypatch.setattr(bspline, "DENSE", size)
+        bspline._sampling_at.cache_clear()
+        matrix = bspline._sampling_at(t.tobytes(), spline.t_start, len(spline.points), degree, spline.spacing)
+        assert isinstance(matrix, kind)
+        sampled.append(spline.sample(t))
+    bspline._sampling_at.cache_clear()
+    sparse, dense = sampled
+    for name in ("position", "velocity", "acceleration", "jerk"):
+        one, other = getattr(sparse, name), getattr(dense, name)
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
 
 
 def test_beyond_both_ends_the_speed_of_the_end_is_held():
