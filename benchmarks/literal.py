@@ -563,7 +563,8 @@ class LiteralResult:
 def drivable(problem: RepairProblem, curve: LiteralCurve, checker: Any, check: str) -> bool:
     """The kinematic check: the drivability checker on every transition, or the package's direct check."""
     from repair.checker import SplicedCurve
-    from repair.kinematics import direct_check, official_check
+    from repair.kinematics import direct_check
+    from repair.ks import official_check
 
     whole = SplicedCurve(problem.reference, curve, problem.t_rep)
     states = checker.drive(whole, problem.t_end).every(checker.config.substeps)

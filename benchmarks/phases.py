@@ -214,7 +214,8 @@ def preparation(context: Context, number: int) -> Report:
 
 def parts(context: Context, number: int) -> Report:
     """Single calls on the repair at t_rep = 0, next to their literal counterparts."""
-    from repair.kinematics import direct_check, official_check
+    from repair.kinematics import direct_check
+    from repair.ks import official_check
 
     made = case(context.path(number), number, "ego")
     problem, checker, config = chosen_problem(made), made.prepared.checker, made.config

@@ -23,8 +23,8 @@ from repair.kinematics import (
     direct_check,
     drive,
     driven_states,
-    official_check,
 )
+from repair.ks import official_check
 from repair.metrics import Peaks, peaks
 from repair.occupancy import first_entry
 from repair.road import Points, RoadBoundary, RoadCorridor

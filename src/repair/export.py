@@ -271,7 +271,7 @@ def to_trajectory(result: RepairResult) -> Any:
     """
     from commonroad.scenario.trajectory import Trajectory
 
-    from repair.kinematics import to_ks_states
+    from repair.ks import to_ks_states
 
     first = result.prepared.scene.initial_time_step
     return Trajectory(initial_time_step=first, state_list=to_ks_states(result.states, first))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from repair.kinematics import DrivenStates, direct_check, drive, official_check
+from repair.kinematics import DrivenStates, direct_check, drive
+from repair.ks import official_check
 from repair.scene.vehicle import load_vehicle
 
 KINDS = (

@@ -20,7 +20,7 @@ from tests.roads import bend
 from repair.api import RepairResult, prepare, search
 from repair.config import Config, load_config
 from repair.errors import RepairError
-from repair.kinematics import official_check
+from repair.ks import official_check
 from repair.scene.commonroad import scene_from_scenario
 from repair.solvers.registry import make_backend
 from repair.types import SearchStatus

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec, solve_ivp
 
-from repair.kinematics import LIMITS, DrivenStates, direct_check, drive, official_check, to_ks_states
+from repair.kinematics import LIMITS, DrivenStates, direct_check, drive
+from repair.ks import official_check, to_ks_states
 from repair.scene.vehicle import load_vehicle
 
 ESCORT = load_vehicle(1)

@@ -12,7 +12,8 @@ from tests import toy
 
 from repair.config import ReferenceConfig
 from repair.errors import ReferenceTrajectoryError, RepairError
-from repair.kinematics import direct_check, drive, official_check
+from repair.kinematics import direct_check, drive
+from repair.ks import official_check
 from repair.occupancy import first_entry
 from repair.reference import SpeedProfile, make_reference
 from repair.scene.commonroad import load_scene
@@ -207,7 +208,7 @@ def write_solution(folder, scene, states, *, first=None, scenario_id=None, probl
     from commonroad.scenario.scenario import ScenarioID
     from commonroad.scenario.trajectory import Trajectory
 
-    from repair.kinematics import to_ks_states
+    from repair.ks import to_ks_states
 
     first = scene.initial_time_step if first is None else first
     solution = PlanningProblemSolution(
