@@ -152,15 +152,15 @@ class _Budget:
     limit: float | None
     begin: float
     clock: Callable[[], float]
+    cut: bool = False  # the last probe would have gone on, had there been time
 
     @property
     def left(self) -> float | None:
-        return None if self.limit is None else self.limit - (self.clock() - self.begin)
+        return None if self.limit is None else max(self.limit - (self.clock() - self.begin), 0.0)
 
     @property
     def spent(self) -> bool:
-        left = self.left
-        return left is not None and left <= 0.0
+        return self.left == 0.0
 
 
 def _probe(
@@ -177,8 +177,10 @@ def _probe(
     tried: list[str] = []
     for problem in problems:
         if tried and budget.spent:
+            budget.cut = True
             break
         solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+        budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
         begin = budget.clock()
         verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
         margin = problem.margin
@@ -268,9 +270,13 @@ def iter_probes(
             return
         if budget.spent:
             raise _OutOfTime
+        budget.cut = False
         probe = _probe(t_rep, problems_at(t_rep), backend, checker, settings.sides, warm_start, budget)
         for problems in _relaxed(source, backend, t_rep):
-            if probe.feasible or budget.spent:
+            if probe.feasible:
+                break
+            if budget.spent:
+                budget.cut = True
                 break
             again = _probe(t_rep, problems, backend, checker, settings.sides, warm_start, budget)
             tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
@@ -279,6 +285,8 @@ def iter_probes(
             warm_start = probe.solve.curve
         answer = probe.feasible
         yield probe
+        if budget.cut and not answer:
+            raise _OutOfTime  # nobody knows whether it would have been feasible
 
 
 def search_f_ttr(

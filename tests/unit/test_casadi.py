@@ -312,6 +312,21 @@ def test_it_keeps_quiet(solver, capfd):
     assert captured.err == ""
 
 
+@pytest.mark.parametrize("cause, expected", [(KeyboardInterrupt(), KeyboardInterrupt), (None, SystemError)])
+def test_an_interrupt_inside_casadi_is_an_interrupt(monkeypatch, cause, expected):
+    """Python reports what was raised below CasADi's buffers as the cause of a SystemError."""
+
+    class Buffered(nlp_model._Buffered):
+        def __init__(self):
+            self._inputs = {}
+
+        def _evaluate(self):
+            raise SystemError("returned a result with an exception set") from cause
+
+    with pytest.raises(expected):
+        Buffered()()
+
+
 def test_two_obstacles_without_a_gap_are_named():
     boxes = [toy.box((20.0, 30.0), (-2.0, 2.0)), toy.box((-60.0, -3.0), (-2.0, 2.0), v=(12.0, 0.0))]
     bare = problems.forced(toy.problem(boxes, lateral=False, t_end=3.0))

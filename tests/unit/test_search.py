@@ -410,6 +410,74 @@ def test_time_limit_cuts_the_sides_of_a_probe():
     assert result.f_ttr == 0.0
 
 
+@dataclass
+class LimitedBackend(FakeBackend):
+    """Gives up at its time limit at some t_rep."""
+
+    at: tuple[float, ...] = (0.0,)
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        self.limits.append(time_limit)
+        if any(abs(problem.t_rep - t) < 1e-9 for t in self.at):
+            return SolveResult(SolveStatus.TIME_LIMIT, detail="no time left")
+        return SolveResult(SolveStatus.SOLVED, curve=toy.constant(10.0), objective=0.0)
+
+
+@pytest.mark.parametrize("rule", ["guided", "bisect", "scan", "as_printed"])
+def test_a_solve_that_ran_out_of_time_is_no_verdict(rule):
+    backend = LimitedBackend(at=(0.0, 2.8, 2.4, 2.0, 1.6, 1.2, 0.8, 0.4))
+    result = search(until(9.0), backend=backend, clock=BentClock(), rule=rule, time_limit=1.0)
+    assert result.status is SearchStatus.BUDGET_EXHAUSTED
+    assert not result.complete
+    assert len(result.probes) == 1  # it is listed all the same
+
+
+def test_what_was_found_before_a_solve_ran_out_of_time_is_no_complete_answer():
+    backend = LimitedBackend(at=(1.6,))
+    result = search(
+        until(9.0), backend=backend, clock=BentClock(), rule="bisect", delta_t=0.4, time_limit=1.0
+    )
+    assert result.status is SearchStatus.FOUND
+    assert result.f_ttr == 0.0
+    assert visited(result) == pytest.approx([0.0, 1.6])
+    assert not result.complete
+
+
+def test_a_time_limit_of_the_backend_alone_is_an_answer():
+    result = search(until(9.0), 1.2, backend=LimitedBackend(), rule="bisect")
+    assert result.status is SearchStatus.NONE_FEASIBLE
+    assert result.complete
+
+
+def test_margins_that_there_was_no_time_for_are_no_verdict():
+    clock = BentClock()
+
+    class Relaxing(FakeSource):
+        def relaxed(self, t_rep):
+            yield self.at(t_rep)
+
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    backend.relaxes = True
+    keys = {"source": Relaxing(), "backend": backend, "clock": clock, "rule": "bisect"}
+    result = search(until(-1.0), time_limit=0.5, **keys)
+    assert (result.status, result.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
+    result = search(until(-1.0), time_limit=9.0, **keys)
+    assert (result.status, result.complete) == (SearchStatus.NONE_FEASIBLE, True)
+
+
+def test_no_backend_is_told_of_less_than_no_time():
+    clock = BentClock()
+
+    class Slow(FakeSource):
+        def at(self, t_rep):
+            clock.tick(1.0)
+            return super().at(t_rep)
+
+    backend = FakeBackend()
+    search(until(9.0), source=Slow(), backend=backend, clock=clock, rule="bisect", time_limit=0.5)
+    assert backend.limits == [0.0]
+
+
 def test_running_to_the_end_exactly_in_time_is_complete():
     clock = BentClock()
     backend = FakeBackend(on_solve=lambda: clock.tick(1.0))

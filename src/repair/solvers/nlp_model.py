@@ -84,7 +84,12 @@ class _Buffered:
         """Evaluate; the outputs by name are overwritten by the next call."""
         for name, value in values.items():
             self._inputs[name][:] = value
-        self._evaluate()
+        try:
+            self._evaluate()
+        except SystemError as error:  # what an interrupt becomes on its way through CasADi's buffers
+            if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+                raise KeyboardInterrupt from None
+            raise
         return self._outputs
 
     def stats(self) -> dict[str, Any]:
