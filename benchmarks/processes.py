@@ -177,7 +177,7 @@ def peers(context: Context) -> Report:
     ego = np.column_stack(
         [*(np.interp(s, frame.s, frame.points[:, k]) for k in (0, 1)), heading, np.full(len(s), speed)]
     )
-    ours = together({"ego": made.search, "literal": made.literal}, context.rounds(9, 3))
+    ours = together({"ego": made.search, "literal": made.literal}, context.rounds(9, 3), shortest=0.03)
     slow = Spread.of(ours["literal"].cpu).median
     report.rows.append(
         row(group, "repair: whole search, ego", ours["ego"], ours["literal"], "literal search")

@@ -131,12 +131,17 @@ def format_certificate(certificate: Certificate) -> str:
     lines.append(f"{'':{width}}  {'value':>10}  {'limit':>10}  {'margin':>10}  {'':8}  how")
     for row in certificate.rows:
         verdict = "ok" if row.ok else "VIOLATED"
-        value, limit, margin = (f"{x + 0.0:10.4f}" for x in (row.value, row.limit, row.margin))
+        value, limit, margin = map(_figure, (row.value, row.limit, row.margin))
         how = f"{row.how}, {row.unit}" if row.unit else row.how
         lines.append(f"{row.name:{width}}  {value}  {limit}  {margin}  {verdict:8}  {how}")
     broken = [row.name for row in certificate.rows if not row.ok]
     lines.append("certified: every margin is kept" if not broken else f"NOT certified: {', '.join(broken)}")
     return "\n".join(lines)
+
+
+def _figure(x: float) -> str:
+    """Four decimals, unless these would show nothing of it."""
+    return f"{x:10.1e}" if 0.0 < abs(x) < 5e-5 else f"{x + 0.0:10.4f}"
 
 
 # -- reading -----------------------------------------------------------------------------------------

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
 from repair.api import repair
-from repair.certify import certify, format_certificate
+from repair.certify import Certificate, CertificateRow, certify, format_certificate
 from repair.errors import RepairError
 
 
@@ -36,6 +37,16 @@ def change(folder, edit):
 
 def broken(certificate):
     return {row.name for row in certificate.rows if not row.ok}
+
+
+@pytest.mark.parametrize(
+    "value, words",
+    [(1.5, "1.5000"), (-0.0, "0.0000"), (-2.4e-5, "-2.4e-05"), (1e-4, "0.0001"), (float("inf"), "inf")],
+)
+def test_no_figure_is_shown_as_a_nought_that_it_is_not(value, words):
+    row = CertificateRow("speed", value, 0.0, value, True, "exact", "m/s")
+    certificate = Certificate(Path("here"), "scenario", "ego", "found", 1.0, (row,))
+    assert f" {words} " in format_certificate(certificate).splitlines()[2]
 
 
 def test_the_hard_repair_of_scenario_1_is_certified(written):

@@ -277,6 +277,22 @@ def test_the_key_table_is_complete() -> None:
     assert set(CHOICES) | set(RANGES) <= set(names)
 
 
+def test_what_a_solver_calls_infeasible_and_the_checker_does_not_is_explained() -> None:
+    from repair.report.text import _fixed, _probe_table
+
+    probe = {
+        "t_rep_s": 0.4, "feasible": True, "reasons": [], "maneuver": "yield", "peak_deceleration_mps2": -1.0,
+        "peak_lateral_acceleration_mps2": 0.0, "min_speed_mps": -0.001, "solver_status": "infeasible",
+        "solver_detail": "that curve passes every check", "iterations": 0, "solve_time_s": 0.0,
+        "check_time_s": 0.0, "details": [],
+    }  # fmt: skip
+    *_, row, detail = _probe_table([probe])
+    assert row.split()[1:6] == ["feasible", "yield", "-1.00", "0.00", "0.00"]
+    assert detail == "  0.40 s: solver: that curve passes every check"
+    assert len(_probe_table([probe | {"solver_status": "solved"}])) == 3
+    assert _fixed(None) == "-"
+
+
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"commonroad-repair {repair.__version__}\n"

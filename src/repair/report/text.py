@@ -86,9 +86,9 @@ def _f_ttr(content: dict[str, Any]) -> str:
 
 def _extremes(content: dict[str, Any]) -> str:
     return (
-        f"peak deceleration {content['peak_deceleration_mps2']:.2f} m/s², "
-        f"peak lateral acceleration {content['peak_lateral_acceleration_mps2']:.2f} m/s², "
-        f"minimum speed {content['min_speed_mps']:.2f} m/s"
+        f"peak deceleration {_fixed(content['peak_deceleration_mps2'])} m/s², "
+        f"peak lateral acceleration {_fixed(content['peak_lateral_acceleration_mps2'])} m/s², "
+        f"minimum speed {_fixed(content['min_speed_mps'])} m/s"
     )
 
 
@@ -125,11 +125,16 @@ def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
         for d in p["details"]
         if d["t_s"] is not None
     ]
+    details += [  # what the solver calls infeasible may pass every check
+        f"  {p['t_rep_s']:.2f} s: solver: {p['solver_detail']}"
+        for p in probes
+        if p["feasible"] and p["solver_status"] == "infeasible" and p["solver_detail"]
+    ]
     return [line.rstrip() for line in lines] + details
 
 
 def _fixed(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+    return "-" if value is None else f"{round(value, 2) + 0.0:.2f}"  # no -0.00
 
 
 def _times(seconds: dict[str, float]) -> str:
