@@ -22,6 +22,7 @@ from repair.types import Array, Curve, FrenetTrajectory, frozen
 
 __all__ = [
     "DENSE",
+    "KEPT",
     "UniformBSpline",
     "basis_matrix",
     "bernstein_matrix",
@@ -105,6 +106,7 @@ def _local_basis(
     return segment, powers @ segment_matrix(degree) / spacing**order
 
 
+KEPT = 2000  #: times up to which the matrix that samples a curve at them is kept: less than 1 MB each
 DENSE = 3000  #: times * points up to which a dense sampling matrix is faster than a sparse one
 
 
@@ -227,8 +229,9 @@ class UniformBSpline:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # Probes ask for the same times over and over; the matrices are worth keeping.
-        matrix = _sampling_at(
+        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
+        made = _sampling_at if len(times) <= KEPT else _sampling_at.__wrapped__
+        matrix = made(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
         position, velocity, acceleration, jerk = evaluated(matrix, self.points)
@@ -289,8 +292,9 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     """
     if isinstance(curve, UniformBSpline):
         # Linear in the curve's control points, and searches ask for the same times over and over.
-        since = round(t_start - curve.t_start, 12)
-        fit = _refit_operator(since, len(curve.points), curve.degree, curve.spacing, n, degree, spacing)
+        since, given = round(t_start - curve.t_start, 12), len(curve.points)
+        made = _refit_operator if n * given <= 10 * DENSE else _refit_operator.__wrapped__
+        fit = made(since, given, curve.degree, curve.spacing, n, degree, spacing)
         points = fit @ curve.points
     else:
         tau, fitted, begin = _fit_operator(n, degree, spacing, 4)

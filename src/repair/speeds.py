@@ -84,6 +84,7 @@ def _family(a_min: float, a_max: float, a_total: float, count: int, step: float)
     since = tau[:, None] - delay
     # Who begins on a sample shows the acceleration there, or else changes nothing.
     harsh = (np.abs(rate) > _GUIDED * a_total) & (since == 0.0).any(axis=0)
+    harsh[0] = False  # who holds the speed has a rate in name only
     harsh.setflags(write=False)
     return _Family(
         rate,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from repair.bspline import DENSE, evaluated, hold_ends
+from repair.bspline import DENSE, KEPT, evaluated, hold_ends
 from repair.types import Array, FrenetTrajectory, frozen
 
 __all__ = ["BernsteinCurve", "QpStructure", "bernstein_basis", "qp_structure"]
@@ -67,8 +67,9 @@ class BernsteinCurve:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         pieces, width, _ = self.points.shape
-        # Probes ask for the same times over and over; the matrices are worth keeping.
-        matrix = _sampling_at(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
+        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
+        made = _sampling_at if len(times) <= KEPT else _sampling_at.__wrapped__
+        matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
         position, velocity, acceleration, jerk = evaluated(matrix, self.points.reshape(pieces * width, 2))
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
