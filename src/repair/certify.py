@@ -361,25 +361,27 @@ def _signed(position: Array) -> Array:
 
 
 def _plane(prepared: Prepared, curve: Curve, t_rep: float, t_end: float) -> list[CertificateRow]:
-    """What happens in the plane, on the vehicle's true outline, every millisecond."""
+    """What happens in the plane, on the vehicle's true outline, every millisecond from ``t_rep`` on.
+
+    The vehicle is driven from the start, because its slip angle has a history.
+    """
+    from repair.checker import SplicedCurve
     from repair.collision import CollisionWorld, official_shifts
     from repair.kinematics import drive
     from repair.metrics import peaks
 
     scene, limits = prepared.scene, prepared.limits
-    first, last = np.floor(t_rep / scene.dt + 1e-6), np.floor(t_end / scene.dt + 1e-6)
     substeps = max(1, round(scene.dt / _SAMPLE))
-    times = np.arange(int((last - first) * substeps) + 1) * (scene.dt / substeps) + first * scene.dt
-    times = times[times >= t_rep - 1e-9]
-    path = scene.frame.cartesian(curve.sample(times))
-    reached = peaks(path)
+    times = np.arange(int(np.floor(t_end / scene.dt + 1e-6)) * substeps + 1) * (scene.dt / substeps)
+    path = scene.frame.cartesian(SplicedCurve(prepared.reference, curve, t_rep).sample(times))
+    since = int(times.searchsorted(t_rep - 1e-9))
+    reached = peaks(path, slice(since, None))
     states = drive(path.t, path.xy, path.heading, path.speed, path.distance, scene.vehicle)
     world = CollisionWorld(
         scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, substeps, official_shifts(scene.scenario)
     )
-    contact = world.contact(
-        states.x, states.y, states.orientation, start=round(float(times[0]) / scene.dt * substeps)
-    )
+    poses = states.x[since:], states.y[since:], states.orientation[since:]
+    contact = world.contact(*poses, start=since)
     rows = [
         _at_most("friction circle", reached.max_total_acceleration, limits.a_total, "sampled", "m/s²"),
         _at_most("lateral acceleration", reached.max_lateral_acceleration, limits.a_lat, "sampled", "m/s²"),
@@ -388,8 +390,8 @@ def _plane(prepared: Prepared, curve: Curve, t_rep: float, t_end: float) -> list
         ),
     ]
     if prepared.checker.road is not None:
-        index = prepared.checker.road.first_off_road(states.x, states.y, states.orientation)
-        left_at = t_end if index is None else float(states.t[index])
+        index = prepared.checker.road.first_off_road(*poses)
+        left_at = t_end if index is None else float(states.t[since + index])
         rows.append(_at_least("leaves the road", left_at, t_end, "sampled", "s"))
     return rows
 

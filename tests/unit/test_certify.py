@@ -117,3 +117,10 @@ def test_a_folder_without_a_result(tmp_path):
     (tmp_path / "result.json").write_text("{")
     with pytest.raises(RepairError, match="cannot be read"):
         certify(tmp_path)
+
+
+def test_the_vehicle_is_driven_from_the_start(scenarios, tmp_path):
+    """With a slip angle from nowhere at t_rep it would turn its corner by millimetres into a follower."""
+    repair(scenarios / "DEU_Lohmar-37_1_T-1.xml").save(tmp_path, figure=False)
+    rows = {row.name: row for row in certify(tmp_path).rows}
+    assert rows["first contact of the rectangles"].ok
