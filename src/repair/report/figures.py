@@ -386,7 +386,7 @@ def _draw_vehicles(axes: Any, result: RepairResult, at: float, window: _Window) 
                 labels.add(f"{k * dt:.3g} s", 0.5 * (outline.min(axis=0) + outline.max(axis=0)))
         if k < len(states):
             corners = _placed(body, states.x[k], states.y[k], states.orientation[k])
-            axes.fill(*corners.T, facecolor=_EGO, edgecolor=_EGO, alpha=dark, zorder=5)
+            axes.fill(*corners.T, facecolor=_EGO, edgecolor=_EGO, alpha=dark, zorder=3)
             labels.add(f"{k * dt:.3g} s", corners.mean(axis=0))
     _draw_motion(axes, result, end, window)
     if result.status is SearchStatus.FOUND:
