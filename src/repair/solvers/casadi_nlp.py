@@ -377,8 +377,8 @@ def _gap(separation: Separation) -> str:
         return ""
     row, axis = (int(i[0]) for i in np.nonzero(closed))
     below, above = (separation.who(row, side) for side in _SIDE_OF[axis])
-    t = separation.times[row]
-    return f"{below} and {above} leave no gap at t = {t:.2f} s"
+    who = f"{below} and {above} leave" if below != above else f"{below} alone leaves"
+    return f"{who} no gap at t = {separation.times[row]:.2f} s"
 
 
 def _largest(residuals: dict[str, float]) -> float:
