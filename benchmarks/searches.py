@@ -38,7 +38,8 @@ def whole_search(context: Context, number: int, delta_t: float) -> Report:
         wanted = WANTED.get(name.removesuffix(", guided"))
         if number == 1 and delta_t == 0.4 and wanted is not None:
             got = ratio(times[label], times[name]).median
-            report.targets.append(_faster(f"search on Scenario 1, {name}", wanted, got))
+            rule = "" if name in GUIDED else ", bisect"
+            report.targets.append(_faster(f"search on Scenario 1, {name}{rule}", wanted, got))
     if number == 1 and delta_t == 0.4 and not context.quick:
         official = together({"": lambda: base.literal("official")}, 2, warm_up=0)[""]
         report.rows.append(
