@@ -107,6 +107,7 @@ def _local_basis(
 
 
 KEPT = 2000  #: times up to which the matrix that samples a curve at them is kept: less than 1 MB each
+_FITS = 30_000  # entries up to which the map from a spline to its fit is kept: 240 kB each
 DENSE = 3000  #: times * points up to which a dense sampling matrix is faster than a sparse one
 
 
@@ -293,7 +294,7 @@ def fit_to_curve(curve: Curve, t_start: float, n: int, degree: int, spacing: flo
     if isinstance(curve, UniformBSpline):
         # Linear in the curve's control points, and searches ask for the same times over and over.
         since, given = round(t_start - curve.t_start, 12), len(curve.points)
-        made = _refit_operator if n * given <= 10 * DENSE else _refit_operator.__wrapped__
+        made = _refit_operator if n * given <= _FITS else _refit_operator.__wrapped__
         fit = made(since, given, curve.degree, curve.spacing, n, degree, spacing)
         points = fit @ curve.points
     else:

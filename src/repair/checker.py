@@ -27,13 +27,14 @@ from repair.kinematics import (
 from repair.ks import official_check
 from repair.metrics import Peaks, peaks
 from repair.occupancy import first_entry
-from repair.road import Points, RoadBoundary, RoadCorridor
+from repair.road import RoadBoundary, RoadCorridor
 from repair.types import (
     Array,
     Curve,
     FrenetTrajectory,
     Limits,
     Occupancy,
+    Points,
     Reason,
     RepairProblem,
     Verdict,

@@ -15,16 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.road import RoadBoundary
-from repair.types import Array
+from repair.types import Array, Points
 
 if TYPE_CHECKING:
     from repair.scene.obstacles import Obstacle
     from repair.scene.vehicle import Vehicle
 
-__all__ = ["CollisionWorld", "Contact", "RoadBoundary", "official_shifts"]
+__all__ = ["CollisionWorld", "Contact", "official_shifts"]
 
-Points = npt.NDArray[np.complexfloating[Any, Any]]
 Index = npt.NDArray[np.intp]
 
 # Shapes closer than this [m] count as touching: rounding must not make us laxer than pycrcc.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from repair.types import Array
+from repair.types import Array, Points
 
 if TYPE_CHECKING:
     from repair.scene.frame import FrenetFrame
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoadBoundary", "RoadCorridor"]
 
-Points = npt.NDArray[np.complexfloating[Any, Any]]
 
 # A prepared geometry must not be asked by two threads at once, and shapely lets other threads run.
 _PREPARED = Lock()

@@ -248,17 +248,13 @@ def iter_probes(
         Upper end of the search [s], excluded: the reference is in conflict there.
     """
     budget = _Budget(settings.time_limit, clock(), clock)
-    made: dict[float, Sequence[RepairProblem]] = {}
-
-    def problems_at(t_rep: float) -> Sequence[RepairProblem]:
-        if t_rep not in made:
-            made[t_rep] = source.at(t_rep)
-        return made[t_rep]
+    made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
 
     def is_open(t_rep: float) -> bool:
-        return not budget.spent and any(
-            problem.passing is None or problem.passing.open for problem in problems_at(t_rep)
-        )
+        if budget.spent:
+            return False
+        made[t_rep] = source.at(t_rep)
+        return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
 
     order = probe_order(settings.rule, end, settings.delta_t, is_open)
     warm_start: Curve | None = None
@@ -271,7 +267,8 @@ def iter_probes(
         if budget.spent:
             raise _OutOfTime
         budget.cut = False
-        probe = _probe(t_rep, problems_at(t_rep), backend, checker, settings.sides, warm_start, budget)
+        first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
+        probe = _probe(t_rep, first, backend, checker, settings.sides, warm_start, budget)
         for problems in _relaxed(source, backend, t_rep):
             if probe.feasible:
                 break

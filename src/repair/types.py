@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 #: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
 Array = npt.NDArray[np.floating[Any]]
+#: Points, or directions, of the plane as complex numbers x + iy: one call where coordinates take two.
+Points = npt.NDArray[np.complexfloating[Any, Any]]
 
 __all__ = [
     "Array",
@@ -28,6 +30,7 @@ __all__ = [
     "Maneuver",
     "Occupancy",
     "Passing",
+    "Points",
     "Probe",
     "Reason",
     "RepairBackend",

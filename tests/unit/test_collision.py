@@ -8,13 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from repair.collision import (
-    CollisionWorld,
-    RoadBoundary,
-    _polygon_touches,
-    _rectangles_touch,
-    official_shifts,
-)
+from repair.collision import CollisionWorld, _polygon_touches, _rectangles_touch, official_shifts
+from repair.road import RoadBoundary
 from repair.scene.obstacles import Obstacle, obstacles_of
 from repair.scene.vehicle import load_vehicle
 

@@ -119,6 +119,28 @@ def test_absence_is_nan_and_not_noted():
 # -- interpolation -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    "times", [0.1 * np.arange(12.0), np.linspace(-0.3, 4.7, 41), np.linspace(-1.0, 9.0, 1500)]
+)
+def test_boxes_at_any_times_are_those_looked_up_one_by_one(times):
+    """On and between steps, where an obstacle comes and goes, outside of the steps, kept or not."""
+    boxes = toy.occupancy(
+        toy.box((18, 24), (-1, 1), v=(3.0, 0.5), present=(0.7, 3.2)),
+        toy.box((40, 45), (-2, 2), present=(0.0, 9.0)),
+    )
+    for corners, found in zip((boxes.lower, boxes.upper), boxes.at(times), strict=True):
+        for time, here in zip(times, found.transpose(1, 0, 2), strict=True):
+            where = time / toy.DT
+            low = round(where) if abs(where - round(where)) < 1e-6 else int(np.floor(where))
+            if not 0 <= where <= len(boxes.t) - 1 + 1e-6:
+                plain = np.full((2, 2), np.nan)
+            elif abs(where - low) < 1e-6:
+                plain = corners[:, low]
+            else:
+                plain = corners[:, low] + (where - low) * (corners[:, low + 1] - corners[:, low])
+            np.testing.assert_allclose(here, plain, rtol=0.0, atol=1e-9)
+
+
 def test_between_steps_the_box_is_interpolated():
     boxes = toy.occupancy(toy.box((10.0, 14.0), (-1.0, 1.0), v=(5.0, -2.0)), duration=1.0)
     times = np.array([0.0, 0.05, 0.1, 0.333, 0.9999999999, 1.0])

@@ -48,11 +48,6 @@ class TimeGrid:
         same again a piece later.
     ratio : (L, M, C) array
         How far each time is on the way from one to the other; NaN where both are one.
-    step, after : (U,) int array
-        Steps of the occupancy before and after each time, the same where the time is a step.
-    share : (U, 1) array or None
-        How far each time is on the way from one to the other, NaN outside of the occupancy; None where
-        all times are steps.
     """
 
     edges: Array
@@ -61,16 +56,6 @@ class TimeGrid:
     base: npt.NDArray[np.intp]
     second: npt.NDArray[np.intp]
     ratio: Array
-    step: npt.NDArray[np.intp]
-    after: npt.NDArray[np.intp]
-    share: Array | None
-
-    def at(self, corners: Array) -> Array:
-        """Boxes' corners (N, U, 2) from those at the steps (N, T, 2), as ``Occupancy.at`` has them."""
-        values = corners.take(self.step, axis=1)
-        if self.share is not None:
-            values += self.share * (corners.take(self.after, axis=1) - values)
-        return values
 
 
 @lru_cache(maxsize=32)
@@ -96,19 +81,7 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     span[span <= 0.0] = np.nan
     # Times first in memory too: products and reductions are several times as fast as in that of t.T.
     ratio = (np.ascontiguousarray(t.T)[:, :, None] - start) / span
-    return TimeGrid(edges, frozen(times), index, base, second, frozen(ratio), *_steps(times, steps))
-
-
-def _steps(times: Array, steps: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array | None]:
-    """Steps before and after each time, and how far it is on the way between them."""
-    where = (times - steps[0]) / (steps[1] - steps[0] if len(steps) > 1 else 1.0)
-    nearest, last = np.rint(where), len(steps) - 1
-    where = np.where(np.abs(where - nearest) < 1e-6, nearest, where)
-    before = np.clip(np.floor(where), 0, last).astype(np.intp)
-    # On a step its own row counts alone: the next one may be NaN.
-    after = np.where(where > before, np.minimum(before + 1, last), before)
-    share = np.where((where < 0) | (where > last), np.nan, where - before)
-    return before, after, share[:, None] if (share != 0.0).any() else None
+    return TimeGrid(edges, frozen(times), index, base, second, frozen(ratio))
 
 
 def time_grid(problem: RepairProblem, pieces: int) -> TimeGrid:
@@ -200,7 +173,7 @@ def _guide(problem: RepairProblem, grid: TimeGrid, reference: Array) -> tuple[Ar
 
 def _boxes(problem: RepairProblem, grid: TimeGrid) -> tuple[Array, Array]:
     """Corners (N, U, 2) of the boxes with their margin; NaN where one is not there."""
-    lower, upper = grid.at(problem.occupancy.lower), grid.at(problem.occupancy.upper)
+    lower, upper = problem.occupancy.at(grid.times)
     lower -= problem.margin
     upper += problem.margin
     return lower, upper

@@ -14,11 +14,9 @@ import numpy.typing as npt
 
 from repair.errors import ScenarioError
 from repair.extremes import largest, smallest
-from repair.types import Array, FrenetTrajectory, frozen
+from repair.types import Array, FrenetTrajectory, Points, frozen
 
 __all__ = ["STANDSTILL", "CartesianPath", "FrenetFrame"]
-
-Points = npt.NDArray[np.complexfloating[Any, Any]]
 
 STANDSTILL = 1e-2
 """Below this speed [m/s] the direction of motion is noise: a trajectory's heading is held."""
