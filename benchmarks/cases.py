@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import literal
-from repair.api import Prepared, prepare
 from repair.config import load_config
-from repair.scene.commonroad import Scene, load_scene
-from repair.scene.synthetic import write_scenario
-from repair.search import search_f_ttr
+from repair.paper.synthetic import write_scenario
+from repair.prepare import prepare
+from repair.scene.commonroad import load_scene
+from repair.scene.scene import Scene
+from repair.search.result import SearchResult
+from repair.search.search import search_f_ttr
+from repair.situation import Prepared
 from repair.solvers.registry import make_backend
-from repair.types import SearchResult
 
 OFFICIAL_FILE = "DEU_Flensburg-6_1_T-1.xml"
 #: name in the tables -> (backend, what is set for it)

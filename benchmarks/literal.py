@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from repair.types import FrenetTrajectory, RepairProblem
+from repair.curves.base import FrenetTrajectory
+from repair.problem.problem import RepairProblem
 
 Points = list[list[float]]
 
@@ -562,9 +563,9 @@ class LiteralResult:
 
 def drivable(problem: RepairProblem, curve: LiteralCurve, checker: Any, check: str) -> bool:
     """The kinematic check: the drivability checker on every transition, or the package's direct check."""
-    from repair.checker import SplicedCurve
-    from repair.kinematics import direct_check
-    from repair.ks import official_check
+    from repair.curves.base import SplicedCurve
+    from repair.vehicle.commonroad_ks import official_check
+    from repair.vehicle.transitions import direct_check
 
     whole = SplicedCurve(problem.reference, curve, problem.t_rep)
     states = checker.drive(whole, problem.t_end).every(checker.config.substeps)
@@ -647,7 +648,7 @@ def best_of(call: Any, repeats: int, number: int = 1) -> float:
 
 def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     """Time of one evaluation of J and of J' with gradient [s], literal and as the package does it."""
-    from repair.solvers import ego as fast
+    from repair.solvers.ego import pairs as fast
 
     p, dt, ego = config.repair.degree, config.repair.spacing, config.ego
     stages = repair_once(problem, ego, p, dt)
@@ -682,10 +683,10 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
 
 def main(path: str, preset: str = "scenario_1") -> None:
     """Print the times of the literal transcription and of the package."""
-    from repair.api import prepare
     from repair.config import load_config
+    from repair.prepare import prepare
     from repair.scene.commonroad import load_scene
-    from repair.search import search_f_ttr
+    from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend
 
     config = load_config(preset=preset)

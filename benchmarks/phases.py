@@ -181,13 +181,13 @@ def shares(context: Context, number: int, backend: str) -> Report:
 
 def preparation(context: Context, number: int) -> Report:
     """What is done once for a scene, each step by itself."""
-    from repair.api import detect_conflict
-    from repair.checker import Checker
-    from repair.occupancy import build_occupancy
-    from repair.reference import make_reference
+    from repair.check.checker import Checker
+    from repair.check.conflict import detect_conflict
+    from repair.reference.registry import make_reference
     from repair.scene.commonroad import load_scene
     from repair.scene.frame import FrenetFrame
     from repair.scene.reading import read_file
+    from repair.world.occupancy import build_occupancy
 
     path = context.path(number)
     made = case(path, number, "ego")
@@ -214,8 +214,8 @@ def preparation(context: Context, number: int) -> Report:
 
 def parts(context: Context, number: int) -> Report:
     """Single calls on the repair at t_rep = 0, next to their literal counterparts."""
-    from repair.kinematics import direct_check
-    from repair.ks import official_check
+    from repair.vehicle.commonroad_ks import official_check
+    from repair.vehicle.transitions import direct_check
 
     made = case(context.path(number), number, "ego")
     problem, checker, config = chosen_problem(made), made.prepared.checker, made.config
@@ -264,7 +264,7 @@ def nlp_build(context: Context, number: int) -> Report:
     """Making the NLP: the first time for a structure, and every time after."""
     report, group = Report(), f"NLP build: {context.title(number)}"
     for backend in ("casadi sqpmethod", "casadi ipopt"):
-        from repair.solvers import casadi_nlp
+        from repair.solvers.casadi import words as casadi_nlp
 
         made: Case = case(context.path(number), number, backend)
         problem = made.prepared.source.at(0.0)[0]

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks import literal
 from benchmarks.cases import Case, Context, case, chosen_problem, scene_of
 from benchmarks.measure import Report, Spread, Target, exponent, row, together
-from repair.api import prepare
-from repair.scene.obstacles import Obstacle
+from repair.prepare import prepare
+from repair.scene.traffic.obstacle import Obstacle
 from repair.solvers.registry import make_backend
 
 POINTS = (20, 40, 80, 160, 320)

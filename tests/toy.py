@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from repair.reference import SpeedProfile
-from repair.types import LateralBounds, Limits, Occupancy, RepairProblem, frozen
+from repair.arrays import frozen
+from repair.problem.limits import Limits
+from repair.problem.problem import RepairProblem
+from repair.reference.profile import SpeedProfile
+from repair.scene.road.bounds import LateralBounds
+from repair.world.boxes import Occupancy
 
 DT = 0.1
 LIMITS = Limits(

@@ -14,9 +14,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from repair.api import Prepared, RepairResult, prepare, repair
-    from repair.bspline import UniformBSpline
+    from repair.api import RepairResult, repair
+    from repair.backend.base import RepairBackend, SolveResult, SolveStatus
+    from repair.check.verdict import Conflict, Reason, Verdict
     from repair.config import Config, load_config, preset_names
+    from repair.curves.base import FrenetTrajectory
+    from repair.curves.bspline import UniformBSpline
     from repair.errors import (
         BackendError,
         ConfigError,
@@ -25,24 +28,15 @@ if TYPE_CHECKING:
         RepairError,
         ScenarioError,
     )
-    from repair.scene.commonroad import Scene, load_scene, scene_from_scenario
+    from repair.prepare import prepare
+    from repair.problem.problem import Maneuver, RepairProblem
+    from repair.scene.commonroad import load_scene, scene_from_scenario
+    from repair.scene.scene import Scene
+    from repair.search.result import Probe, SearchResult, SearchStatus
+    from repair.situation import Prepared
     from repair.solvers.registry import available as available_backends
     from repair.solvers.registry import backend_names
     from repair.solvers.registry import register as register_backend
-    from repair.types import (
-        Conflict,
-        FrenetTrajectory,
-        Maneuver,
-        Probe,
-        Reason,
-        RepairBackend,
-        RepairProblem,
-        SearchResult,
-        SearchStatus,
-        SolveResult,
-        SolveStatus,
-        Verdict,
-    )
 
     __version__: str
 
@@ -83,19 +77,23 @@ __all__ = [
 ]
 
 _NAMES: dict[str, tuple[str, ...]] = {
-    "repair.api": ("Prepared", "RepairResult", "prepare", "repair"),
-    "repair.bspline": ("UniformBSpline",),
+    "repair.api": ("RepairResult", "repair"),
+    "repair.backend.base": ("RepairBackend", "SolveResult", "SolveStatus"),
+    "repair.check.verdict": ("Conflict", "Reason", "Verdict"),
     "repair.config": ("Config", "load_config", "preset_names"),
+    "repair.curves.base": ("FrenetTrajectory",),
+    "repair.curves.bspline": ("UniformBSpline",),
     "repair.errors": (
         "BackendError", "ConfigError", "OutputError", "ReferenceTrajectoryError", "RepairError",
         "ScenarioError",
     ),
-    "repair.scene.commonroad": ("Scene", "load_scene", "scene_from_scenario"),
+    "repair.prepare": ("prepare",),
+    "repair.problem.problem": ("Maneuver", "RepairProblem"),
+    "repair.scene.commonroad": ("load_scene", "scene_from_scenario"),
+    "repair.scene.scene": ("Scene",),
+    "repair.search.result": ("Probe", "SearchResult", "SearchStatus"),
+    "repair.situation": ("Prepared",),
     "repair.solvers.registry": ("backend_names",),
-    "repair.types": (
-        "Conflict", "FrenetTrajectory", "Maneuver", "Probe", "Reason", "RepairBackend", "RepairProblem",
-        "SearchResult", "SearchStatus", "SolveResult", "SolveStatus", "Verdict",
-    ),
 }  # fmt: skip
 # public name -> (module, name in it)
 _HOME = {name: (module, name) for module, names in _NAMES.items() for name in names}

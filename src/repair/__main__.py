@@ -1,6 +1,6 @@
 """``python -m repair``: the same as the command ``repair``."""
 
-from repair.cli import entry
+from repair.cli.command import entry
 
 if __name__ == "__main__":
     entry()

@@ -14,171 +14,20 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from repair.baselines.evasive.settings import EvasiveConfig
+from repair.baselines.qptr.settings import QptrConfig
+from repair.check.settings import CheckerConfig
 from repair.errors import ConfigError
+from repair.problem.settings import LimitsConfig, RepairConfig
+from repair.reference.settings import ReferenceConfig
+from repair.scene.settings import SceneConfig
+from repair.search.settings import SearchConfig
+from repair.solvers.casadi.settings import CasadiConfig
+from repair.solvers.ego.settings import EgoConfig
 
 __all__ = ["Config", "load_config", "preset_names"]
 
 _PRESETS = Path(__file__).with_name("presets")
-
-
-@dataclass
-class SearchConfig:
-    """Algorithm 1."""
-
-    rule: str = "bisect"  # guided: fewer probes; scan: every one; as_printed: to the letter
-    delta_t: float = 0.4  # resolution of the search grid [s]
-    upper: float | None = None  # upper end [s]; null: TTC
-    time_limit: float | None = None  # whole search [s]
-    sides: str = "best"  # best: every open side of passing is tried; first: the first feasible one
-
-
-@dataclass
-class SceneConfig:
-    """How the scenario is read."""
-
-    vehicle: int = 1  # CommonRoad vehicle type; 1 is the Ford Escort
-    planning_problem: int | None = None  # id; null: the smallest
-    horizon: float | None = None  # cap of the planning horizon [s]
-    after_prediction: str = "remove"  # remove | hold | constant_velocity
-    s_offset: float | None = None  # S_offset [m]; null: half the vehicle's length + 0.1
-    l_offset: float | None = None  # L_offset [m]; null: half the vehicle's width + 0.1
-
-
-@dataclass
-class ReferenceConfig:
-    """Where the reference trajectory comes from."""
-
-    source: str = "planner"  # planner | constant | accelerate | recorded | file
-    file: str | None = None  # CommonRoad solution file (source: file)
-    obstacle_id: int | None = None  # recorded obstacle (source: recorded); null: the recorded ego
-    awareness: str = "none"  # none | constant_velocity
-    desired_speed: float | None = None  # [m/s]; null: the larger of initial speed and speed limit
-    a_lat: float = 1.2  # lateral comfort on the path's curvature [m/s²]
-    a_min: float = -1.5  # comfort braking [m/s²]
-    a_max: float = 1.0  # comfort acceleration [m/s²]
-    progress: float = 0.1  # cost of 1 m/s below the desired speed, against (1 m/s²)² of acceleration
-    time_step: float = 1.0  # layer of the graph search [s]
-    speed_step: float = 0.25  # grid of the graph search [m/s]
-
-
-@dataclass
-class LimitsConfig:
-    """What a repaired trajectory may do; null means the vehicle's own limit."""
-
-    v_max: float | None = None  # speed [m/s]; null: the vehicle's
-    v_lat: float = 3.0  # speed sideways, across the driven path [m/s]
-    a_min: float | None = None  # braking [m/s²]; null: minus a_total
-    a_max: float | None = None  # accelerating [m/s²]; null: what the engine gives at the initial speed
-    a_lat: float | None = None  # lateral acceleration [m/s²]; null: a_total
-    a_total: float | None = None  # friction circle [m/s²]; null: 0.9 of the vehicle's
-    j_lon: float = 60.0  # jerk along the path [m/s³], at most what the drivability checker can follow
-    j_lat: float = 60.0  # jerk sideways [m/s³]
-
-
-@dataclass
-class RepairConfig:
-    """The repair problem, the same for every backend."""
-
-    horizon: float | None = None  # end of the repair [s]; null: TTC + after_conflict
-    after_conflict: float = 3.0  # [s]
-    clearance: float = 0.3  # the paper's s_f [m]
-    margin: float = 0.1  # distance hard backends keep from the inflated box [m]
-    # Margins [m] that hard backends try next where none of the manoeuvres is feasible: down to the
-    # vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
-    relax: list[float] = field(default_factory=lambda: [-0.1, -0.5, -1.2, -2.5])
-    lateral: str = "road"  # none | lane | same_direction | road
-    degree: int = 3  # of the B-spline
-    spacing: float = 0.2  # knot spacing [s]
-
-
-@dataclass
-class DeformWeights:
-    """lambda_s, lambda_c, lambda_d."""
-
-    smooth: float = 1.0  # lambda_s
-    collision: float = 1000.0  # lambda_c
-    feasible: float = 1000.0  # lambda_d
-
-
-@dataclass
-class RefineWeights:
-    """lambda_s, lambda_d, lambda_f."""
-
-    smooth: float = 1.0  # lambda_s
-    feasible: float = 1000.0  # lambda_d
-    fit: float = 1.0  # lambda_f
-
-
-@dataclass
-class EgoConfig:
-    """The paper's two-stage soft optimisation."""
-
-    deform: DeformWeights = field(default_factory=DeformWeights)
-    refine: RefineWeights = field(default_factory=RefineWeights)
-    w_v: float = 1.0  # the paper's weight of speeds beyond the limits
-    w_a: float = 1.0  # of accelerations
-    w_j: float = 1.0  # of jerks
-    elastic: float = 0.95  # the paper's lambda
-    joint: float = 1.5  # c_j as a multiple of c_m
-    reverse: float = 200.0  # weight of speeds below zero, not scaled by lambda_d: no limit of the paper
-    solver: str = "newton"  # two ways to the same minimum
-    max_iterations: int = 100  # in each stage (100 in the paper, of L-BFGS)
-    tolerance: float = 0.01  # on the gradient (0.01 in the paper)
-    rebounds: int = 3  # restarts with a doubled lambda_c while a collision remains
-    precondition: bool = True  # L-BFGS with the quadratic part made round: same optimum, faster
-    guard: bool = True  # keep the deformed curve where refining it would bring back a collision
-
-
-@dataclass
-class CasadiConfig:
-    """The hard-constraint NLP."""
-
-    solver: str = "ipopt"  # ipopt | sqpmethod
-    obstacles: str = "hull"  # hull | sampled
-    w_acceleration: float = 1.0  # cost of acceleration squared
-    w_jerk: float = 0.1  # cost of jerk squared
-    w_reference: float = 0.05  # cost of the distance to the reference squared
-    heading: float = 0.7  # largest angle between the driven path and the axis [rad]
-    overhang: float = 2.15  # half length of the body whose ends must stay on the road [m]
-    rounds: int = 8  # solves around the own solution until the exact constraints are kept
-    max_iterations: int = 200  # of the solver, in each round
-    tolerance: float = 1e-8  # of the solver
-
-
-@dataclass
-class QptrConfig:
-    """The Bernstein QP baseline."""
-
-    solver: str = "daqp"  # any QP solver that qpsolvers finds: daqp | osqp | clarabel | ...
-    degree: int = 5  # of the Bernstein polynomials
-    spacing: float = 0.5  # duration of a piece [s]
-    continuity: int = 2  # derivatives that are continuous at the joints
-    w_jerk: float = 1.0  # cost of jerk squared
-    w_deviation: float = 0.1  # cost of the distance to the reference squared
-
-
-@dataclass
-class EvasiveConfig:
-    """The fixed evasive manoeuvres behind the TTR of the paper's baseline."""
-
-    a_brake: float = 8.0  # full braking [m/s²]
-    a_kick: float = 8.0  # kick-down, as far as the engine goes [m/s²]
-    a_steer: float = 8.0  # steering: lateral acceleration [m/s²]
-    model: str = "point_mass"  # point_mass | kinematic
-    collision: str = "rectangles"  # rectangles | boxes
-    offset_max: float = 4.0  # widest lateral offset to steer to [m]
-    offset_step: float = 0.5  # [m]
-
-
-@dataclass
-class CheckerConfig:
-    """The feasibility check."""
-
-    substeps: int = 4  # samples per scenario step between which nothing is looked at
-    official: str = "leftover"  # leftover | always | never
-    road: bool = True  # the ego's rectangle stays on the road
-    limits: bool = True  # the repaired part keeps the limits
-    margin: bool = False  # the repaired part keeps out of the inflated boxes, as the TTC has it
 
 
 @dataclass

@@ -11,9 +11,11 @@ from dataclasses import replace
 import numpy as np
 from tests import toy
 
-from repair.passing import open_passings
-from repair.reference import SpeedProfile
-from repair.types import FrenetTrajectory, Maneuver, Passing, Side, frozen
+from repair.arrays import frozen
+from repair.curves.base import FrenetTrajectory
+from repair.problem.passing import open_passings
+from repair.problem.problem import Maneuver, Passing, Side
+from repair.reference.profile import SpeedProfile
 
 
 def guided(problem, maneuver=None):

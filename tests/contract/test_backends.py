@@ -9,22 +9,18 @@ import pytest
 from tests import toy
 from tests.contract import problems
 
-from repair.bspline import UniformBSpline, fit_to_curve
-from repair.config import SearchConfig, load_config
+from repair.arrays import frozen
+from repair.backend.base import SolveResult, SolveStatus
+from repair.check.verdict import Conflict, Reason, Verdict, Violation
+from repair.config import load_config
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve
 from repair.errors import BackendError
-from repair.search import search_f_ttr
+from repair.search.result import SearchStatus
+from repair.search.search import search_f_ttr
+from repair.search.settings import SearchConfig
 from repair.solvers import registry
 from repair.solvers.registry import available, backend_names, make_backend, register
-from repair.types import (
-    Conflict,
-    Reason,
-    SearchStatus,
-    SolveResult,
-    SolveStatus,
-    Verdict,
-    Violation,
-    frozen,
-)
 
 HARD = ("casadi-ipopt", "casadi-sqpmethod", "casadi-ipopt-sampled")
 _OVERRIDES = {

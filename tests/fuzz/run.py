@@ -132,10 +132,11 @@ def _solution(files: tuple[Path, ...]) -> tuple[Path, bytes]:
 
 def run_case(case: Case, rng: random.Random, folder: Path) -> tuple[str, str]:
     """Whole pipeline on one input; returns the outcome's word and its detail."""
-    from repair.api import prepare, search
+    from repair.api import search
     from repair.config import load_config
     from repair.errors import ConfigError, RepairError
-    from repair.export import to_json
+    from repair.io.result_json import to_json
+    from repair.prepare import prepare
     from repair.scene.commonroad import load_scene
     from repair.solvers.registry import make_backend
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from repair.cli import main
+from repair.cli.command import main
 
 FILE = "DEU_Flensburg-6_1_T-1.xml"
 
@@ -24,7 +24,7 @@ def source(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
         return "official", request.getfixturevalue("scenarios") / FILE
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # protobuf's deprecations, on import
-        from repair.scene.synthetic import write_scenario
+        from repair.paper.synthetic import write_scenario
     return "reconstruction", write_scenario("scenario_1", tmp_path_factory.mktemp("scenario"))
 
 

@@ -12,7 +12,8 @@ import pytest
 
 from repair.api import RepairResult, repair
 from repair.config import load_config
-from repair.scene.commonroad import Scene, load_scene, scene_from_scenario
+from repair.scene.commonroad import load_scene, scene_from_scenario
+from repair.scene.scene import Scene
 
 
 @pytest.fixture(scope="module", params=["official", "reconstruction"])
@@ -21,7 +22,7 @@ def scene(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         return load_scene(request.getfixturevalue("scenarios") / "DEU_Flensburg-6_1_T-1.xml")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # protobuf's deprecations, on import
-        from repair.scene.synthetic import write_scenario
+        from repair.paper.synthetic import write_scenario
     file: Path = write_scenario("scenario_1", tmp_path_factory.mktemp("scenario"))
     return load_scene(file)
 

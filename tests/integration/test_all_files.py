@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from repair.api import RepairResult, prepare, search
-from repair.checker import Checker
+from repair.api import RepairResult, search
+from repair.check.checker import Checker
 from repair.config import load_config
 from repair.errors import RepairError
+from repair.prepare import prepare
 from repair.scene.commonroad import load_scene
+from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
-from repair.types import SearchStatus
 
 CONFIG = load_config()
 UNUSABLE = {"DEU_TestIntersectionInteract-3_1_T-1.xml"}  # the ego starts 57 m off all lanelets

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from repair.api import repair
-from repair.study import SweepSettings, sweep
+from repair.study.rows import SweepSettings
+from repair.study.run import sweep
 
 FILES = ("DEU_Muc-4_1_T-1.xml", "C-DEU_B471-1_1_T-1.xml", "ZAM_Urban-3_3.xml", "BEL_Nivelles-16_3_T-1.xml")
 

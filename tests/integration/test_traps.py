@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 from tests.roads import ROAD, SLOW, car, driving, exact, lanelet, point, problem, scenario, state
 
-from repair.api import RepairResult, prepare, repair, search
-from repair.collision import official_shifts
+from repair.api import RepairResult, repair, search
 from repair.config import load_config
 from repair.errors import ConfigError, OutputError, ReferenceTrajectoryError, RepairError, ScenarioError
-from repair.scene.commonroad import Scene, load_scene
+from repair.prepare import prepare
+from repair.scene.commonroad import load_scene
+from repair.scene.scene import Scene
+from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
-from repair.types import SearchStatus
+from repair.world.late import official_shifts
 
 CONFIG = load_config()
 

@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from repair.bspline import UniformBSpline, basis_matrix, splice_points
+from repair.curves.bases import basis_matrix
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import splice_points
 
 coordinate = st.floats(-200.0, 200.0, allow_subnormal=False)
 

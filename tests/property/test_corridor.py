@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from tests.toy import DT, WIDE, box, problem
 
-from repair.baselines import corridor
-from repair.baselines.qptr import QptrBackend
-from repair.config import QptrConfig
-from repair.reference import SpeedProfile
-from repair.types import FrenetTrajectory, Maneuver, Passing, Side, frozen
+from repair.arrays import frozen
+from repair.baselines.qptr import corridor
+from repair.baselines.qptr.backend import QptrBackend
+from repair.baselines.qptr.settings import QptrConfig
+from repair.curves.base import FrenetTrajectory
+from repair.problem.problem import Maneuver, Passing, Side
+from repair.reference.profile import SpeedProfile
 
 AROUND = (-2.0, 0.0, 2.0)
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from repair.kinematics import DrivenStates, direct_check, drive
-from repair.ks import official_check
-from repair.scene.vehicle import load_vehicle
+from repair.vehicle.commonroad_ks import official_check
+from repair.vehicle.parameters import load_vehicle
+from repair.vehicle.single_track import drive
+from repair.vehicle.states import DrivenStates
+from repair.vehicle.transitions import direct_check
 
 KINDS = (
     "typical", "low_speed", "standstill", "v_switch", "engine", "fast", "reverse", "steering_limit",

@@ -9,15 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repair import kinematics
-from repair.checker import Checker
-from repair.collision import CollisionWorld
-from repair.kinematics import _errors, body_angles, clearly_drivable, direct_check, driven_states
-from repair.metrics import peaks
-from repair.road import RoadBoundary, RoadCorridor, _grouping
-from repair.scene.frame import STANDSTILL, CartesianPath, FrenetFrame, _held
-from repair.scene.obstacles import Obstacle
-from repair.scene.vehicle import load_vehicle
+from repair.check.checker import Checker
+from repair.check.peaks import peaks
+from repair.curves.plane import STANDSTILL, CartesianPath
+from repair.scene.frame import FrenetFrame, held_headings
+from repair.scene.traffic.obstacle import Obstacle
+from repair.vehicle import states as kinematics
+from repair.vehicle.parameters import load_vehicle
+from repair.vehicle.single_track import body_angles, driven_states
+from repair.vehicle.transitions import direct_check, transition_errors
+from repair.vehicle.transitions_fast import clearly_drivable
+from repair.world.collision import CollisionWorld
+from repair.world.road import RoadBoundary, grouping
+from repair.world.road_corridor import RoadCorridor
 
 EGO = load_vehicle(1)
 
@@ -62,7 +66,7 @@ def test_the_heading_of_a_stop_is_that_of_the_last_moving_sample(moving):
         last = k if moves else last
         wanted.append(-1.0 if last is None else heading[last])
     pace = np.where(moving, STANDSTILL, 0.5 * STANDSTILL)
-    assert _held(heading, fallback, pace).tolist() == wanted
+    assert held_headings(heading, fallback, pace).tolist() == wanted
 
 
 @pytest.mark.parametrize("sideways", [0.0, 0.3])
@@ -125,7 +129,7 @@ def test_most_poses_on_a_wide_road_are_settled_by_boxes():
 
 
 def test_the_last_pose_fills_up_the_last_group():
-    assert _grouping(10, 4).T.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 9, 9]]
+    assert grouping(10, 4).T.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 9, 9]]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
@@ -306,7 +310,7 @@ def test_the_bounds_of_clearly_drivable_hold_for_the_errors(errors, monkeypatch)
             if not clearly_drivable(*motion, 0.1, EGO):
                 continue
             states = driven_states(np.arange(len(motion[0])) * 0.1, *motion, EGO)
-            error = float(np.max(_errors(states, 0.1, EGO)[errors == "turn"]))
+            error = float(np.max(transition_errors(states, 0.1, EGO)[errors == "turn"]))
             patch.setattr(kinematics, name, error / share * (1.0 - 1e-6))
             asked += error > 1e-6
             assert error <= 1e-9 or not clearly_drivable(*motion, 0.1, EGO)

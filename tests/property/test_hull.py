@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 from tests import toy
 from tests.contract import problems
 
-from repair.bspline import UniformBSpline, derivative_matrix
-from repair.config import CasadiConfig
-from repair.passing import open_passings
-from repair.solvers.casadi_nlp import CasadiBackend
-from repair.solvers.nlp_rows import bernstein_rows
-from repair.types import SolveStatus, frozen
+from repair.arrays import frozen
+from repair.backend.base import SolveStatus
+from repair.curves.bases import derivative_matrix
+from repair.curves.bspline import UniformBSpline
+from repair.problem.passing import open_passings
+from repair.solvers.casadi.backend import CasadiBackend
+from repair.solvers.casadi.rows import bernstein_rows
+from repair.solvers.casadi.settings import CasadiConfig
 
 SOLVERS = st.sampled_from(["ipopt", "sqpmethod"])
 

@@ -17,13 +17,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.roads import bend
 
-from repair.api import RepairResult, prepare, search
+from repair.api import RepairResult, search
 from repair.config import Config, load_config
 from repair.errors import RepairError
-from repair.ks import official_check
+from repair.prepare import prepare
 from repair.scene.commonroad import scene_from_scenario
+from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
-from repair.types import SearchStatus
+from repair.vehicle.commonroad_ks import official_check
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # protobuf's deprecations, on import

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from repair.baselines import bernstein
-from repair.baselines.bernstein import BernsteinCurve, bernstein_basis, qp_structure
-from repair.types import Curve, frozen
+from repair.arrays import frozen
+from repair.baselines.qptr.structure import qp_structure
+from repair.curves import bernstein
+from repair.curves.base import Curve
+from repair.curves.bernstein import BernsteinCurve, bernstein_basis
 
 
 def chain(seed=0, pieces=4, degree=5):

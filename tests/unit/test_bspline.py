@@ -10,18 +10,17 @@ from benchmarks import literal
 from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 
-from repair import bspline
-from repair.bspline import (
-    UniformBSpline,
+from repair.curves import bases as bspline
+from repair.curves.bases import (
     basis_matrix,
     bernstein_matrix,
     derivative_matrix,
-    fit_to_curve,
     n_points_for,
     segment_matrix,
-    splice_points,
 )
-from repair.reference import SpeedProfile
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve, splice_points
+from repair.reference.profile import SpeedProfile
 
 DEGREES = (3, 4, 5)
 

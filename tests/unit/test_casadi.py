@@ -9,14 +9,18 @@ import pytest
 from tests import toy
 from tests.contract import problems
 
-from repair.bspline import UniformBSpline
-from repair.config import CasadiConfig
+from repair.arrays import frozen
+from repair.backend.base import SolveStatus
+from repair.curves.bspline import UniformBSpline
+from repair.problem.problem import Maneuver, Side
 from repair.scene.frame import FrenetFrame
-from repair.solvers import nlp_instance, nlp_model
-from repair.solvers.casadi_nlp import CasadiBackend
-from repair.solvers.nlp_model import build_model
-from repair.solvers.separation import NOBODY, ROAD, Windows, road_room, separate
-from repair.types import LateralBounds, Maneuver, Side, SolveStatus, frozen
+from repair.scene.road.bounds import LateralBounds
+from repair.solvers.casadi import buffered as nlp_model
+from repair.solvers.casadi import instance as nlp_instance
+from repair.solvers.casadi.backend import CasadiBackend
+from repair.solvers.casadi.model import build_model
+from repair.solvers.casadi.separation import NOBODY, ROAD, Windows, road_room, separate
+from repair.solvers.casadi.settings import CasadiConfig
 
 INF = np.inf
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from repair.api import repair
-from repair.certify import Certificate, CertificateRow, certify, format_certificate
+from repair.certify.certificate import Certificate, CertificateRow, format_certificate
+from repair.certify.recompute import certify
 from repair.errors import RepairError
 
 

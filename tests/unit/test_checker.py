@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from tests import roads
 
-from repair.api import prepare
-from repair.bspline import UniformBSpline, fit_to_curve
-from repair.checker import Checker, SplicedCurve
+from repair.arrays import frozen
+from repair.check.checker import Checker
 from repair.config import load_config
-from repair.occupancy import first_entry
+from repair.curves.base import SplicedCurve
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve
+from repair.prepare import prepare
 from repair.scene.commonroad import load_scene
-from repair.types import frozen
+from repair.world.occupancy import first_entry
 
 
 @pytest.fixture(scope="module")

@@ -14,15 +14,16 @@ from typing import Any
 import pytest
 
 import repair
-from repair import cli
-from repair.cli import main
+from repair.backend.base import SolveResult
+from repair.cli import command as cli
+from repair.cli.command import main
 from repair.config import Config
+from repair.problem.problem import RepairProblem
 from repair.solvers import registry
-from repair.types import RepairProblem, SolveResult
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # protobuf's deprecations, on import
-    from repair.scene.synthetic import write_scenario
+    from repair.paper.synthetic import write_scenario
 
 HEAVY = ("scipy", "matplotlib", "casadi", "commonroad", "commonroad_dc", "omegaconf", "shapely", "networkx")
 
@@ -270,7 +271,7 @@ def test_presets_and_config(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_key_table_is_complete() -> None:
     from repair.config import CHOICES, RANGES
-    from repair.report.text import configuration_keys
+    from repair.report.keys import configuration_keys
 
     names = [key.name for key in configuration_keys()]
     assert len(names) == len(set(names))
@@ -278,7 +279,7 @@ def test_the_key_table_is_complete() -> None:
 
 
 def test_what_a_solver_calls_infeasible_and_the_checker_does_not_is_explained() -> None:
-    from repair.report.text import _fixed, _probe_table
+    from repair.report.text import fixed, probe_table
 
     probe = {
         "t_rep_s": 0.4, "feasible": True, "reasons": [], "maneuver": "yield", "peak_deceleration_mps2": -1.0,
@@ -286,11 +287,11 @@ def test_what_a_solver_calls_infeasible_and_the_checker_does_not_is_explained() 
         "solver_detail": "that curve passes every check", "iterations": 0, "solve_time_s": 0.0,
         "check_time_s": 0.0, "details": [],
     }  # fmt: skip
-    *_, row, detail = _probe_table([probe])
+    *_, row, detail = probe_table([probe])
     assert row.split()[1:6] == ["feasible", "yield", "-1.00", "0.00", "0.00"]
     assert detail == "  0.40 s: solver: that curve passes every check"
-    assert len(_probe_table([probe | {"solver_status": "solved"}])) == 3
-    assert _fixed(None) == "-"
+    assert len(probe_table([probe | {"solver_status": "solved"}])) == 3
+    assert fixed(None) == "-"
 
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
@@ -486,7 +487,7 @@ def test_a_reader_that_leaves_is_no_error() -> None:
 
 
 def test_the_documented_table_is_up_to_date() -> None:
-    from repair.report.text import key_table
+    from repair.report.keys import key_table
 
     usage = Path(__file__).parents[2] / "docs" / "usage.md"
     assert usage.read_text("utf-8").endswith(f"{key_table()}\n"), "renew it with `repair config --table`"

@@ -8,10 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from repair.collision import CollisionWorld, _polygon_touches, _rectangles_touch, official_shifts
-from repair.road import RoadBoundary
-from repair.scene.obstacles import Obstacle, obstacles_of
-from repair.scene.vehicle import load_vehicle
+from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.obstacles import obstacles_of
+from repair.vehicle.parameters import load_vehicle
+from repair.world.collision import CollisionWorld
+from repair.world.late import official_shifts
+from repair.world.road import RoadBoundary
+from repair.world.touching import polygon_touches, rectangles_touch
 
 EGO = load_vehicle(1)
 HALF = (0.5 * EGO.length, 0.5 * EGO.width)
@@ -63,7 +66,7 @@ def test_rectangles_as_in_pycrcc():
     turn = np.exp(1j * (other[:, 2] - ego[:, 2]))
     diagonal = other[:, 3:] @ [1.0, 1j]
     shapes = np.array((offset, turn * diagonal, turn * diagonal.conj()))
-    ours = _rectangles_touch(shapes, turn, np.array(complex(*HALF)), diagonal)
+    ours = rectangles_touch(shapes, turn, np.array(complex(*HALF)), diagonal)
     theirs = [
         RectOBB(*HALF, e[2], e[0], e[1]).collide(RectOBB(o[3], o[4], o[2], o[0], o[1]))
         for e, o in zip(ego, other, strict=True)
@@ -84,8 +87,8 @@ def test_polygons_as_in_shapely():
         c, s = np.cos(heading), np.sin(heading)
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * HALF @ np.array([[c, s], [-s, c]]) + (x, y)
         answers.append(shapely.Polygon(corners).intersects(shapely.Polygon(polygon)))
-        assert _polygon_touches(polygon, (x, y, c, s), np.array(HALF)) == answers[-1]
-        assert _polygon_touches(polygon[:-1][::-1], (x, y, c, s), np.array(HALF)) == answers[-1]
+        assert polygon_touches(polygon, (x, y, c, s), np.array(HALF)) == answers[-1]
+        assert polygon_touches(polygon[:-1][::-1], (x, y, c, s), np.array(HALF)) == answers[-1]
     assert 0.2 < np.mean(answers) < 0.8
 
 

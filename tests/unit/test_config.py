@@ -7,9 +7,9 @@ from dataclasses import asdict, fields, is_dataclass
 import pytest
 import yaml
 
-from repair import config as module
 from repair.config import CHOICES, RANGES, Config, load_config, preset_names
 from repair.errors import ConfigError, RepairError
+from repair.scene import settings as module
 
 
 def value_of(config, key):

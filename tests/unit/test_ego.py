@@ -12,10 +12,16 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_array
 from tests import toy
 
-from repair.bspline import UniformBSpline, fit_to_curve, n_points_for
-from repair.config import DeformWeights, EgoConfig, RefineWeights
-from repair.solvers import ego, minimise, spline_cost
-from repair.types import FrenetTrajectory, Maneuver, Passing, Side, SolveResult, SolveStatus, frozen
+from repair.arrays import frozen
+from repair.backend.base import SolveResult, SolveStatus
+from repair.curves.base import FrenetTrajectory
+from repair.curves.bases import n_points_for
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve
+from repair.problem.problem import Maneuver, Passing, Side
+from repair.solvers.ego import minimise, spline_cost
+from repair.solvers.ego import pairs as ego
+from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
 
 # The paper's two stages and nothing else.
 PLAIN = EgoConfig(rebounds=0, guard=False)
@@ -466,10 +472,10 @@ def test_literal_fit_of_the_reference_is_the_backends(degree):
 
 
 def test_literal_search_finds_the_same_f_ttr_in_scenario_1(scenarios):
-    from repair.api import prepare
     from repair.config import load_config
+    from repair.prepare import prepare
     from repair.scene.commonroad import load_scene
-    from repair.search import search_f_ttr
+    from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend
 
     path = scenarios / "DEU_Flensburg-6_1_T-1.xml"

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from tests.toy import constant
 
-from repair.api import prepare
-from repair.baselines.at_ttr import problems_at_ttr, repair_at_ttr
-from repair.baselines.evasive import EvasiveManeuver, EvasiveStatus, evasive_ttr, maneuvers_at
-from repair.config import EvasiveConfig, load_config
+from repair.baselines.evasive.maneuvers import EvasiveManeuver, maneuvers_at
+from repair.baselines.evasive.problems import problems_at_ttr, repair_at_ttr
+from repair.baselines.evasive.settings import EvasiveConfig
+from repair.baselines.evasive.times import EvasiveStatus, evasive_ttr
+from repair.config import load_config
+from repair.curves.base import Curve
+from repair.paper.scenario_1 import scenario_1
+from repair.paper.scenario_2 import RoadDamage, scenario_2
+from repair.prepare import prepare
 from repair.scene.commonroad import scene_from_scenario
-from repair.scene.synthetic import RoadDamage, scenario_1, scenario_2
-from repair.scene.vehicle import load_vehicle
+from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
-from repair.types import Curve, SearchStatus
+from repair.vehicle.parameters import load_vehicle
 
 VEHICLE = load_vehicle(1)
 BRAKE, KICK, LEFT, RIGHT = EvasiveManeuver
@@ -125,7 +129,7 @@ def test_steering_gives_the_ttr_of_the_road_damage(damage):
 def test_later_starts_fail_and_the_ttr_does_not(junction):
     ready = prepared(junction, 1)
     result = evasive_ttr(ready)
-    from repair.checker import SplicedCurve
+    from repair.curves.base import SplicedCurve
 
     for step, hits in ((0, False), (1, True)):
         t = result.ttb + step * ready.scene.dt

@@ -12,19 +12,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from repair import export
+from repair import arrays as export
 from repair.api import RepairResult, repair
-from repair.baselines.bernstein import BernsteinCurve
-from repair.bspline import UniformBSpline
+from repair.backend.base import SolveResult, SolveStatus
+from repair.check.verdict import Conflict
 from repair.config import load_config
+from repair.curves.bernstein import BernsteinCurve
+from repair.curves.bspline import UniformBSpline
 from repair.errors import OutputError
-from repair.export import save, saved, to_dict, to_dynamic_obstacle, to_json, to_solution, to_trajectory
+from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
+from repair.io.result_json import to_dict, to_json
+from repair.save import save, saved
 from repair.scene.commonroad import load_scene, scene_from_scenario
-from repair.types import Conflict, SearchResult, SearchStatus, SolveResult, SolveStatus
+from repair.search.result import SearchResult, SearchStatus
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # protobuf's deprecations, on import
-    from repair.scene.synthetic import write_scenario
+    from repair.paper.synthetic import write_scenario
 
 CONFIG = load_config(preset="scenario_1")
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -306,7 +310,9 @@ def test_a_name_taken_by_a_folder(found: RepairResult, tmp_path: Path) -> None:
 def test_figures_are_drawn_without_global_state(found: RepairResult) -> None:
     import sys
 
-    from repair.report.figures import birdseye_figure, profile_figure, render, stages_figure
+    from repair.report.birdseye import birdseye_figure
+    from repair.report.profiles import profile_figure, stages_figure
+    from repair.report.style import render
 
     before = "matplotlib.pyplot" in sys.modules
     figure = profile_figure(found)
@@ -326,7 +332,9 @@ def test_figures_are_drawn_without_global_state(found: RepairResult) -> None:
 
 
 def test_figures_without_a_repair(no_repair: RepairResult) -> None:
-    from repair.report.figures import birdseye_figure, profile_figure, render, stages_figure
+    from repair.report.birdseye import birdseye_figure
+    from repair.report.profiles import profile_figure, stages_figure
+    from repair.report.style import render
 
     for draw in (profile_figure, birdseye_figure):
         assert render(draw(no_repair), "svg")

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from repair.arrays import Array
+from repair.curves.base import FrenetTrajectory
+from repair.curves.plane import STANDSTILL
 from repair.errors import ScenarioError
-from repair.scene.frame import STANDSTILL, FrenetFrame
-from repair.types import Array, FrenetTrajectory
+from repair.scene.frame import FrenetFrame
 
 TURN_RADIUS = 8.0
 

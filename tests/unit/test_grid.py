@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from tests import toy
 
 from repair.config import load_config
-from repair.grid import Grid
-from repair.passing import surroundings
-from repair.problems import ProblemFactory
-from repair.reference import SpeedProfile
+from repair.problem.factory import ProblemFactory
+from repair.problem.surroundings import surroundings
+from repair.problem.tables import Grid
+from repair.reference.profile import SpeedProfile
 
 T_END = 4.0
 BRAKING = SpeedProfile.from_accelerations(0.0, 12.0, [1.0, 20.0], [0.0, -0.5])

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec, solve_ivp
 
-from repair.kinematics import LIMITS, DrivenStates, direct_check, drive
-from repair.ks import official_check, to_ks_states
-from repair.scene.vehicle import load_vehicle
+from repair.vehicle.commonroad_ks import official_check, to_ks_states
+from repair.vehicle.parameters import load_vehicle
+from repair.vehicle.single_track import drive
+from repair.vehicle.states import DrivenStates
+from repair.vehicle.transitions import LIMITS, direct_check
 
 ESCORT = load_vehicle(1)
 

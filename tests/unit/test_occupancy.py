@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import toy
 
-from repair.occupancy import build_occupancy, first_entry, relevant, shrink_to_start
+from repair.arrays import frozen
+from repair.curves.base import FrenetTrajectory
 from repair.scene.frame import FrenetFrame
-from repair.scene.obstacles import Obstacle
-from repair.types import FrenetTrajectory, Occupancy, frozen
+from repair.scene.traffic.obstacle import Obstacle
+from repair.world.boxes import Occupancy
+from repair.world.occupancy import build_occupancy, first_entry, relevant, shrink_to_start
 
 STRAIGHT = FrenetFrame.from_points([[0.0, 0.0], [200.0, 0.0]])
 _TURN = np.linspace(0.0, 0.5 * np.pi, 60)

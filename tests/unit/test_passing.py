@@ -11,17 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import toy
 
-from repair.passing import (
-    _kinds,
-    _lateral_profiles,
-    _quintics,
-    open_passings,
-    sides_of,
-    surroundings,
-)
-from repair.reference import SpeedProfile
-from repair.speeds import Bends, speed_profiles
-from repair.types import LateralBounds, Maneuver, Side, frozen
+from repair.arrays import frozen
+from repair.problem.lateral import _quintics, lateral_profiles
+from repair.problem.passing import _kinds, open_passings
+from repair.problem.problem import Maneuver, Side
+from repair.problem.speeds import Bends, speed_profiles
+from repair.problem.surroundings import sides_of, surroundings
+from repair.reference.profile import SpeedProfile
+from repair.scene.road.bounds import LateralBounds
 
 MARGIN = 0.1
 # The way that comes closest where none is open is added at this cost; it may collide.
@@ -366,7 +363,7 @@ def test_who_gets_past_the_obstacle_in_conflict_goes_ahead(rows, v0, margin):
     met = surroundings(reference, cars, margin)
     start = np.array([reference.position[0], reference.velocity[0], reference.acceleration[0]])
     speeds = speed_profiles(start, reference.t, toy.LIMITS)
-    (keep,) = _lateral_profiles(start, reference.t, reference, met, toy.LIMITS, toy.WIDE, margin, False)
+    (keep,) = lateral_profiles(start, reference.t, reference, met, toy.LIMITS, toy.WIDE, margin, False)
     found = dict(_kinds(keep, met, speeds))
     passed = np.zeros(len(speeds.cost), dtype=bool)
     if met.conflict is not None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from benchmarks import literal
 
-from repair.bspline import derivative_matrix
-from repair.solvers.penalties import REVERSE_JOINT, SoftBounds, feasibility_bounds
+from repair.curves.bases import derivative_matrix
+from repair.solvers.ego.penalties import REVERSE_JOINT, SoftBounds, feasibility_bounds
 
 MAXIMA = np.array([[10.0, 2.0], [3.0, 2.5], [8.0, 9.0]])
 MINIMA = np.array([[0.0, -2.0], [-6.0, -2.5], [-8.0, -9.0]])

@@ -7,13 +7,17 @@ import pytest
 from tests.contract import problems
 from tests.toy import box, constant, problem
 
-from repair.baselines.corridor import NoCorridor, build_corridor, time_grid
-from repair.baselines.qp import QpAnswer, braking_problem, infeasibility, require_solver, solve_projection
-from repair.baselines.qptr import QptrBackend, make
-from repair.config import QptrConfig, load_config
+from repair.backend.base import SolveStatus
+from repair.baselines.qptr.backend import QptrBackend, make
+from repair.baselines.qptr.corridor import NoCorridor, build_corridor, time_grid
+from repair.baselines.qptr.qp import QpAnswer, infeasibility, solve_projection
+from repair.baselines.qptr.qp_trial import braking_problem, require_solver
+from repair.baselines.qptr.settings import QptrConfig
+from repair.config import load_config
+from repair.curves.base import FrenetTrajectory
 from repair.errors import BackendError, ConfigError
-from repair.passing import sides_of
-from repair.types import FrenetTrajectory, Maneuver, Passing, SolveStatus
+from repair.problem.problem import Maneuver, Passing
+from repair.problem.surroundings import sides_of
 
 SOLVERS = ("osqp", "daqp", "clarabel")
 
@@ -202,7 +206,7 @@ def test_residuals_and_objective_are_those_of_the_curve():
 
 
 def test_residuals_tell_a_curve_that_breaks_the_limits(monkeypatch):
-    from repair.baselines import qptr
+    from repair.baselines.qptr import axis as qptr
 
     def claim(rows, *_):
         return QpAnswer(SolveStatus.SOLVED, np.full(rows.shape[1], 20.0), 0.0, "claimed")
@@ -253,7 +257,7 @@ def test_unknown_solver_names_those_there_are():
 
 
 def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
-    from repair.baselines import qp
+    from repair.baselines.qptr import qp
 
     def broken(rows, *_):
         return qp._Raw(np.zeros(rows.shape[1]), np.zeros(len(rows)), "solved")
@@ -266,7 +270,7 @@ def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
 
 
 def test_answer_is_judged_by_its_residuals_not_by_its_name(monkeypatch):
-    from repair.baselines import qp
+    from repair.baselines.qptr import qp
 
     rows, lower, upper = braking_problem(14.75)
     claim = qp._Raw(np.full(18, 1e3), np.zeros(len(rows)), "solved")
@@ -295,7 +299,7 @@ def test_infinite_bounds_bound_nothing_and_nothing_is_written_to(solver):
 
 @pytest.mark.parametrize("gap", [0.0, 5.0, 13.0, 13.7])
 def test_no_solution_is_proved_without_the_linear_program(gap, monkeypatch):
-    from repair.baselines import qp
+    from repair.baselines.qptr import qp
 
     least = infeasibility(*braking_problem(gap))
     assert 1e-5 < qp._proven_violation(*braking_problem(gap)) <= least + 1e-9
@@ -304,9 +308,9 @@ def test_no_solution_is_proved_without_the_linear_program(gap, monkeypatch):
 
 
 def test_linear_program_decides_where_there_is_no_proof(monkeypatch):
-    from repair.baselines import qp
+    from repair.baselines.qptr import qp
 
-    monkeypatch.setattr(qp, "_proven_violation", lambda *_: 0.0)
+    monkeypatch.setattr(qp, "proven_violation", lambda *_: 0.0)
     assert solve_projection(*braking_problem(13.0), "daqp").status is SolveStatus.INFEASIBLE
     monkeypatch.setattr(qp, "_call", lambda *_: qp._Raw(None, None, "maximum iterations reached"))
     assert solve_projection(*braking_problem(14.75), "osqp").status is SolveStatus.ITERATION_LIMIT
@@ -314,13 +318,13 @@ def test_linear_program_decides_where_there_is_no_proof(monkeypatch):
 
 @pytest.mark.parametrize("gap", [13.76, 13.85, 14.75, 100.0])
 def test_nothing_is_proved_against_a_problem_with_a_solution(gap):
-    from repair.baselines.qp import _proven_violation
+    from repair.baselines.qptr.qp import proven_violation
 
-    assert _proven_violation(*braking_problem(gap)) == 0.0
+    assert proven_violation(*braking_problem(gap)) == 0.0
 
 
 def test_a_loose_osqp_answer_is_tightened(monkeypatch):
-    from repair.baselines import qp
+    from repair.baselines.qptr import qp
 
     exact = solve_projection(*braking_problem(13.85), "daqp").z
     np.testing.assert_allclose(solve_projection(*braking_problem(13.85), "osqp").z, exact, atol=1e-4)

@@ -10,14 +10,16 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from tests import toy
 
-from repair.config import ReferenceConfig
+from repair.arrays import frozen
 from repair.errors import ReferenceTrajectoryError, RepairError
-from repair.kinematics import direct_check, drive
-from repair.ks import official_check
-from repair.occupancy import first_entry
-from repair.reference import SpeedProfile, make_reference
+from repair.reference.profile import SpeedProfile
+from repair.reference.registry import make_reference
+from repair.reference.settings import ReferenceConfig
 from repair.scene.commonroad import load_scene
-from repair.types import frozen
+from repair.vehicle.commonroad_ks import official_check
+from repair.vehicle.single_track import drive
+from repair.vehicle.transitions import direct_check
+from repair.world.occupancy import first_entry
 
 SCENARIO_1 = "DEU_Flensburg-6_1_T-1"
 SOME = (SCENARIO_1, "ZAM_Tjunction-1_84_T-1", "DEU_Lohmar-21_1_T-1", "ZAM_Zip-1_19_T-1", "USA_Peach-3_4_T-1")
@@ -208,7 +210,7 @@ def write_solution(folder, scene, states, *, first=None, scenario_id=None, probl
     from commonroad.scenario.scenario import ScenarioID
     from commonroad.scenario.trajectory import Trajectory
 
-    from repair.ks import to_ks_states
+    from repair.vehicle.commonroad_ks import to_ks_states
 
     first = scene.initial_time_step if first is None else first
     solution = PlanningProblemSolution(

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from repair.errors import ConfigError, RepairError, ScenarioError
-from repair.scene.commonroad import Scene, load_scene, scene_from_scenario
+from repair.scene.commonroad import load_scene, scene_from_scenario
 from repair.scene.lead_in import largest_curvature
-from repair.scene.obstacles import last_predicted_step, obstacles_of
 from repair.scene.reading import read_file
-from repair.scene.vehicle import load_vehicle
+from repair.scene.scene import Scene
+from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
+from repair.vehicle.parameters import load_vehicle
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # protobuf's deprecations, on import

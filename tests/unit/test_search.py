@@ -9,20 +9,15 @@ import numpy as np
 import pytest
 from tests import toy
 
-from repair.config import Config, SearchConfig
-from repair.search import probe_order, search_f_ttr
+from repair.backend.base import SolveResult, SolveStatus
+from repair.check.verdict import Conflict, Reason, Verdict, Violation
+from repair.config import Config
+from repair.problem.problem import Maneuver, Passing
+from repair.search.result import SearchStatus
+from repair.search.rules import probe_order
+from repair.search.search import search_f_ttr
+from repair.search.settings import SearchConfig
 from repair.solvers import registry
-from repair.types import (
-    Conflict,
-    Maneuver,
-    Passing,
-    Reason,
-    SearchStatus,
-    SolveResult,
-    SolveStatus,
-    Verdict,
-    Violation,
-)
 
 
 @dataclass
@@ -572,7 +567,7 @@ def test_a_new_backend_runs_through_the_whole_house(monkeypatch, scenarios):
         name = "brake"
 
         def solve(self, problem, *, warm_start=None, time_limit=None):
-            from repair.reference import SpeedProfile
+            from repair.reference.profile import SpeedProfile
 
             s, v = problem.start[0, 0], problem.start[1, 0]
             profile = SpeedProfile.from_accelerations(s, v, [v / 2.8], [-2.8])

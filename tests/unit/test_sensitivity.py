@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from repair.cli import main
+from repair.cli.command import main
 from repair.config import load_config
-from repair.report import sensitivity as report
-from repair.report.sensitivity import VARIATIONS, Variation, sensitivity
-from repair.scene.synthetic import RoadDamage
+from repair.paper import sensitivity as report
+from repair.paper.scenario_2 import RoadDamage
+from repair.paper.sensitivity import VARIATIONS, Variation, sensitivity
 
 
 @pytest.fixture(autouse=True, scope="module")

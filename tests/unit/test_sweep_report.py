@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from repair.report.sweep import sweep_report
-from repair.study import COLUMNS
+from repair.study.rows import COLUMNS
 
 
 def row(file, backend, status, **values):

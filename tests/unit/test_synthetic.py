@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from repair.errors import ConfigError, OutputError
-from repair.scene import synthetic
-from repair.scene.synthetic import SCENARIOS, RoadDamage, scenario_1, scenario_2, write_scenario
+from repair.paper import roads as synthetic
+from repair.paper.scenario_1 import scenario_1
+from repair.paper.scenario_2 import RoadDamage, scenario_2
+from repair.paper.synthetic import SCENARIOS, write_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning")
 

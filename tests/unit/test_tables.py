@@ -8,8 +8,9 @@ import re
 import pytest
 
 from repair.errors import ConfigError
-from repair.report.grid import DASH, Section, Table, against, decimal
-from repair.report.tables import METHODS, machine, table1, table2
+from repair.paper.table1 import METHODS, table1
+from repair.paper.table2 import machine, table2
+from repair.report.tables import DASH, Section, Table, against, decimal
 
 QUICK = tuple(m for m in METHODS if m.backend != "casadi")
 

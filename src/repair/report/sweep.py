@@ -14,12 +14,12 @@ _REPAIRED = ("found", "no_conflict")
 
 
 def sweep_report(rows: Sequence[Row], command: str) -> str:
-    """Markdown of the rows of :func:`repair.study.sweep`.
+    """Markdown of the rows of :func:`repair.study.run.sweep`.
 
     Parameters
     ----------
     rows : sequence of mapping
-        With the keys :data:`repair.study.COLUMNS`.
+        With the keys :data:`repair.study.rows.COLUMNS`.
     command : str
         The command that made them, to stand beside the figures.
     """

@@ -1,243 +1,131 @@
-"""The paper's Table I, regenerated: what the paper prints, what comes out here, and the difference."""
+"""Small tables of text with the numbers behind them, rendered as Markdown, JSON and LaTeX."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
-from repair.errors import RepairError
-from repair.report.grid import Section, Table, against, decimal
-from repair.report.paper_cases import origin_of, origin_text, paper_scenes
-from repair.report.timing import machine, table2
-from repair.types import Probe, Reason, SearchResult, SolveStatus, Violation
+__all__ = ["DASH", "Section", "Table", "against", "decimal"]
 
-if TYPE_CHECKING:
-    from repair.api import Prepared
-    from repair.config import Config
-    from repair.scene.commonroad import Scene
-
-__all__ = [
-    "METHODS",
-    "PEAK_NAMES",
-    "Method",
-    "Section",
-    "Table",
-    "machine",
-    "peak_of",
-    "status_of",
-    "table1",
-    "table2",
-]
-
-# Table I of the paper: (F-)TTR [s], and peak [m/s²] or the word that stands in its place.
-_PAPER: dict[tuple[str, int], tuple[float, float | str]] = {
-    ("qptr_at_ttr", 1): (2.6, "not solvable"),
-    ("qptr_at_ttr", 2): (1.3, "infeasible"),
-    ("ego", 1): (1.6, -1.86),
-    ("ego", 2): (0.8, 4.82),
-}
-_PAPER_TTC = {1: 2.9, 2: 1.6}
-PEAK_NAMES = {1: "max. lon. dec.", 2: "max. lat. acc."}
+DASH = "–"  # where there is no number
 
 
 @dataclass(frozen=True)
-class Method:
-    """One row of Table I: its key, its name, and the configuration that makes it."""
+class Section:
+    """A grid of texts under a heading.
 
-    key: str
-    name: str
-    driver: str
-    backend: str
-    overrides: tuple[str, ...] = ()
-    in_paper: bool = True
-
-
-METHODS = (
-    Method("qptr_at_ttr", "QPTR at TTR", "at_ttr", "qptr"),
-    Method("ego", "Soft, two stages (the paper's)", "f_ttr", "ego"),
-    Method("casadi_ipopt", "Hard NLP (IPOPT)", "f_ttr", "casadi", ("casadi.solver=ipopt",), False),
-    Method("casadi_sqp", "Hard NLP (sqpmethod)", "f_ttr", "casadi", ("casadi.solver=sqpmethod",), False),
-    Method("qptr", "QPTR in the search", "f_ttr", "qptr", (), False),
-)
-
-
-def table1(
-    scenario_dir: Path | str | None = None,
-    *,
-    methods: Sequence[Method] = METHODS,
-    scenarios: Sequence[int] = (1, 2),
-    overrides: Sequence[str] = (),
-) -> Table:
-    """Table I: (F-)TTR and peak accelerations of QPTR at its TTR, the paper's method, and three more rows.
-
-    Parameters
+    Attributes
     ----------
-    scenario_dir : path, optional
-        Folder that may hold the official file of Scenario 1; the reconstruction is used otherwise.
-    methods : sequence of Method
-    scenarios : sequence of int
-        Numbers of the paper's scenarios.
-    overrides : sequence of ``"key=value"``
-        Laid over the presets.
-
-    Raises
-    ------
-    RepairError
-        If a scenario cannot be used. A backend that is not there becomes a row that says so.
+    heading : str
+    columns : tuple of str
+    rows : tuple of tuple of str
+    rule_after : int or None
+        A line is drawn below this many rows.
+    rule_label : str
+        What the rows below that line are.
     """
-    from tqdm import tqdm
 
-    scenes = paper_scenes(scenario_dir, scenarios)
-    sections: list[Section] = []
-    data: list[dict[str, Any]] = []
-    bar = tqdm(total=len(scenarios) * len(methods), desc="table I", disable=None, leave=False)
-    for number, scene in scenes.items():
-        results = []
-        for method in methods:
-            results.append(_result(method, number, scene, overrides))
-            bar.update()
-        ttc = next((r["ttc_s"] for r in results if r["ttc_s"] is not None), None)
-        origin = origin_of(scene)
-        sections.append(_section1(number, origin, ttc, results, methods))
-        ttcs = against(_PAPER_TTC[number], ttc)
-        data.append({"scenario": number, "provenance": origin, "ttc_s": ttcs, "rows": results})
-    bar.close()
-    notes = [
-        "Difference: ours minus the paper's. docs/reproduction.md explains deviations.",
-        "At TTR: the latest start of a fixed evasive manoeuvre, then one repair there. In the search: the "
-        "latest t_rep whose repair passes every check.",
-    ]
-    if any(d["provenance"]["kind"] == "reconstruction" for d in data):
-        notes.append("A reconstruction is generated from the paper's text; it is not the paper's own file.")
-    title = "Table I: (F-)TTR and repair, paper and ours"
-    return Table(title, tuple(sections), tuple(notes), {"scenarios": data})
+    heading: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    rule_after: int | None = None
+    rule_label: str = "not in the paper"
 
 
-def _config(method: Method, number: int, overrides: Sequence[str]) -> Config:
-    from repair.config import load_config
+@dataclass(frozen=True)
+class Table:
+    """A regenerated table: texts to render, and the numbers behind them.
 
-    keys = [f"driver={method.driver}", f"backend={method.backend}", *method.overrides, *overrides]
-    return load_config(preset=f"scenario_{number}", overrides=keys)
+    Attributes
+    ----------
+    title : str
+    sections : tuple of Section
+    notes : tuple of str
+    data : dict
+        What :meth:`to_json` writes: plain numbers, None where there is none.
+    """
 
+    title: str
+    sections: tuple[Section, ...]
+    notes: tuple[str, ...]
+    data: dict[str, Any] = field(default_factory=dict)
 
-def _result(method: Method, number: int, scene: Scene, overrides: Sequence[str]) -> dict[str, Any]:
-    """One cell group of Table I as plain values."""
-    paper_ttr, paper_peak = _PAPER.get((method.key, number), (None, None))
-    row: dict[str, Any] = {
-        "key": method.key, "method": method.name, "ttc_s": None, "paper_status": None,
-        "ttr_s": against(paper_ttr, None), "maneuver": None, "probes": [],
-    }  # fmt: skip
-    numeric = paper_peak if isinstance(paper_peak, float) else None
-    row["paper_status"] = paper_peak if isinstance(paper_peak, str) else None
-    row["peak_mps2"] = against(numeric, None)
-    try:
-        prepared, found, ttr = _run(_config(method, number, overrides), scene)
-    except RepairError as error:
-        return {**row, "status": "unavailable", "status_text": f"not available: {error}"}
-    probe = found.best if found.best is not None else (found.probes[0] if found.probes else None)
-    peak = None
-    # Also of a repair that the checker refuses: the paper's "infeasible" is of that kind.
-    if probe is not None and probe.solve.curve is not None and (probe.feasible or method.driver == "at_ttr"):
-        peak = peak_of(prepared, probe, number)
-    row |= {
-        "ttc_s": against(None, prepared.conflict.time)["ours"],
-        "ttr_s": against(paper_ttr, ttr),
-        "peak_mps2": against(numeric, peak),
-        "maneuver": _maneuver(found.best),
-        "probes": [{"t_rep_s": round(p.t_rep, 6), "answer": _answer(p)} for p in found.probes],
-    }
-    text = _answer(found.probes[0]) if method.driver == "at_ttr" and found.probes else status_of(found)
-    return {**row, "status": found.status.value, "status_text": text}
+    def to_markdown(self) -> str:
+        """GitHub-flavoured Markdown."""
+        lines = [f"## {self.title}"]
+        for section in self.sections:
+            lines += [
+                "",
+                f"### {section.heading}",
+                "",
+                _pipe(section.columns),
+                _pipe(["---"] * len(section.columns)),
+            ]
+            for k, row in enumerate(section.rows):
+                if k == section.rule_after:
+                    lines.append(_pipe([f"*{section.rule_label}*"] + [""] * (len(row) - 1)))
+                lines.append(_pipe(row))
+        lines += ["", *(f"- {note}" for note in self.notes)]
+        return "\n".join(lines) + "\n"
 
+    def to_json(self) -> str:
+        """Strict JSON."""
+        content = {"title": self.title, **self.data, "notes": list(self.notes)}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
-def _run(config: Config, scene: Scene) -> tuple[Prepared, SearchResult, float | None]:
-    """Prepare and run one method; (F-)TTR as the driver has it."""
-    from repair.api import prepare
-    from repair.baselines.at_ttr import repair_at_ttr
-    from repair.search import search_f_ttr
-    from repair.solvers.registry import make_backend
-
-    backend = make_backend(config.backend, config)
-    prepared = prepare(scene, config)
-    if config.driver == "at_ttr":
-        answer = repair_at_ttr(prepared, backend)
-        return prepared, answer.search, answer.ttr
-    found = search_f_ttr(prepared.source, prepared.conflict, backend, prepared.checker, config.search)
-    return prepared, found, found.f_ttr
-
-
-def peak_of(prepared: Prepared, probe: Probe, number: int) -> float:
-    """The acceleration that Table I prints for a scenario [m/s²], of a repair that has a curve."""
-    from repair.checker import SplicedCurve
-
-    assert probe.solve.curve is not None
-    curve = SplicedCurve(prepared.reference, probe.solve.curve, probe.t_rep)
-    peaks = prepared.checker.peaks(curve, prepared.t_end, probe.t_rep)
-    return peaks.min_acceleration if number == 1 else peaks.max_lateral_acceleration
-
-
-def _answer(probe: Probe) -> str:
-    """What one t_rep came to; the ways to fail have different names."""
-    if probe.feasible:
-        return "feasible"
-    if probe.solve.curve is not None:
-        return "rejected: " + "; ".join(_words(v) for v in probe.verdict.violations)
-    if Reason.NO_PASSAGE in {v.reason for v in probe.verdict.violations}:
-        return "no way past is open"
-    names = {SolveStatus.NO_CORRIDOR: "no corridor", SolveStatus.INFEASIBLE: "no solution"}
-    return names.get(probe.solve.status, probe.solve.status.value.replace("_", " "))
+    def to_latex(self) -> str:
+        """One ``table`` with a booktabs ``tabular`` for each section."""
+        lines = [
+            "% needs \\usepackage{booktabs}",
+            "\\begin{table}[htbp]",
+            "  \\centering",
+            f"  \\caption{{{_tex(self.title)}}}",
+        ]
+        for k, section in enumerate(self.sections):
+            lines += [] if k == 0 else ["  \\par\\medskip"]
+            lines += [f"  {_tex(section.heading)}\\par\\smallskip"]
+            lines += [
+                f"  \\begin{{tabular}}{{@{{}}l{'r' * (len(section.columns) - 2)}l@{{}}}}",
+                "    \\toprule",
+            ]
+            lines += ["    " + " & ".join(_tex(c) for c in section.columns) + " \\\\", "    \\midrule"]
+            for number, row in enumerate(section.rows):
+                if number == section.rule_after:
+                    lines.append("    \\midrule")
+                lines.append("    " + " & ".join(_tex(c) for c in row) + " \\\\")
+            lines += ["    \\bottomrule", "  \\end{tabular}"]
+        lines += [f"  \\par\\footnotesize {_tex(note)}" for note in self.notes]
+        return "\n".join([*lines, "\\end{table}"]) + "\n"
 
 
-def _words(violation: Violation) -> str:
-    """Margin and collision name the obstacle only; who reads has to know which of the two it was."""
-    joint = {Reason.MARGIN: "margin of ", Reason.COLLISION: "contact with "}.get(violation.reason, "")
-    return joint + violation.detail if violation.detail else violation.reason.value.replace("_", " ")
+def _pipe(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |"
 
 
-def _maneuver(probe: Probe | None) -> str | None:
-    return None if probe is None or probe.maneuver is None else probe.maneuver.value
+_TEX = {
+    "\\": "\\textbackslash{}", "&": "\\&", "%": "\\%", "$": "\\$", "#": "\\#", "_": "\\_",
+    "{": "\\{", "}": "\\}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "²": "$^2$",
+    "±": "$\\pm$", "−": "$-$", "–": "--", "…": "\\ldots{}", "Δ": "$\\Delta$", "<": "$<$", ">": "$>$",
+}  # fmt: skip
 
 
-def status_of(found: SearchResult) -> str:
-    """In words: how the repair passes the conflict, and what the earliest refused t_rep came to."""
-    if not found.probes:
-        return found.status.sentence
-    refused = [p for p in found.probes if not p.feasible]
-    parts = [] if found.best is None else [f"feasible ({_maneuver(found.best) or 'follow'})"]
-    if refused:
-        first = min(refused, key=lambda p: p.t_rep)
-        parts.append(f"{first.t_rep:.1f} s: {_answer(first)}")
-    return "; ".join(parts)
+def _tex(text: str) -> str:
+    return "".join(_TEX.get(c, c) for c in text)
 
 
-def _three(values: dict[str, float | None], digits: int) -> tuple[str, str, str]:
-    paper, ours, difference = values["paper"], values["ours"], values["difference"]
-    return decimal(paper, digits), decimal(ours, digits), decimal(difference, digits, True)
+def against(paper: float | None, ours: float | None) -> dict[str, float | None]:
+    """Paper, ours and the difference; None where there is no number."""
+    ours = round(ours, 6) if ours is not None and math.isfinite(ours) else None
+    difference = round(ours - paper, 6) if ours is not None and paper is not None else None
+    return {"paper": paper, "ours": ours, "difference": difference}
 
 
-def _section1(
-    number: int,
-    origin: dict[str, Any],
-    ttc: float | None,
-    results: Sequence[dict[str, Any]],
-    methods: Sequence[Method],
-) -> Section:
-    head = against(_PAPER_TTC[number], ttc)
-    heading = (
-        f"Scenario {number} ({origin_text(origin)}): TTC {decimal(head['paper'], 1)} s in the paper, "
-        f"{decimal(head['ours'], 1)} s here, difference {decimal(head['difference'], 1, True)} s"
-    )
-    peak = PEAK_NAMES[number]
-    columns = (
-        "", "(F-)TTR [s], paper", "ours", "difference",
-        f"{peak} [m/s²], paper", "ours", "difference", "status",
-    )  # fmt: skip
-    rows = []
-    for result in results:
-        ttr, top = _three(result["ttr_s"], 1), _three(result["peak_mps2"], 2)
-        paper = result["paper_status"] or top[0]
-        rows.append((result["method"], *ttr, paper, *top[1:], result["status_text"]))
-    above = sum(m.in_paper for m in methods)
-    return Section(heading, columns, tuple(rows), above if above < len(methods) else None)
+def decimal(value: float | None, digits: int, signed: bool = False) -> str:
+    """A number with a typographic minus; a dash where there is none."""
+    if value is None:
+        return DASH
+    text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
+    return text.replace("-", "−") if float(text) != 0.0 else f"{0.0:.{digits}f}"

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-__all__ = ["configuration_keys", "key_table", "preset_summary", "summary"]
+__all__ = ["fixed", "probe_table", "summary"]
 
 _KINDS = {
     "margin": "the safety margin of obstacle {id} is entered",
@@ -32,7 +28,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     Parameters
     ----------
     content : dict
-        See :func:`repair.export.to_dict`.
+        See :func:`repair.io.result_json.to_dict`.
     preset : str or None
         The preset's name, for the headline.
     written : sequence of Path
@@ -53,7 +49,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     if not content["complete"]:
         lines.append("          The search was stopped early: a later time-to-repair may be feasible.")
     if content["probes"]:
-        lines += ["", *_probe_table(content["probes"])]
+        lines += ["", *probe_table(content["probes"])]
     lines += ["", f"Time      {_times(content['time_s'])}"]
     lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(content["notes"])]
     if written:
@@ -86,13 +82,13 @@ def _f_ttr(content: dict[str, Any]) -> str:
 
 def _extremes(content: dict[str, Any]) -> str:
     return (
-        f"peak deceleration {_fixed(content['peak_deceleration_mps2'])} m/s², "
-        f"peak lateral acceleration {_fixed(content['peak_lateral_acceleration_mps2'])} m/s², "
-        f"minimum speed {_fixed(content['min_speed_mps'])} m/s"
+        f"peak deceleration {fixed(content['peak_deceleration_mps2'])} m/s², "
+        f"peak lateral acceleration {fixed(content['peak_lateral_acceleration_mps2'])} m/s², "
+        f"minimum speed {fixed(content['min_speed_mps'])} m/s"
     )
 
 
-def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
+def probe_table(probes: list[dict[str, Any]]) -> list[str]:
     head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_lat", "v_min", "solver", "solve", "check")
     units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
     table: list[tuple[str, ...]] = [head, units]
@@ -103,7 +99,7 @@ def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
                 "feasible" if p["feasible"] else ", ".join(p["reasons"]),
                 (p["maneuver"] or "-").replace("_", " "),
                 *(
-                    _fixed(p[k])
+                    fixed(p[k])
                     for k in ("peak_deceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps")
                 ),
                 f"{p['solver_status']}, {p['iterations']} it.",
@@ -133,7 +129,7 @@ def _probe_table(probes: list[dict[str, Any]]) -> list[str]:
     return [line.rstrip() for line in lines] + details
 
 
-def _fixed(value: float | None) -> str:
+def fixed(value: float | None) -> str:
     return "-" if value is None else f"{round(value, 2) + 0.0:.2f}"  # no -0.00
 
 
@@ -143,67 +139,3 @@ def _times(seconds: dict[str, float]) -> str:
     outer = [f"{name} {value:.0f}" for name, value in parts.items() if name != "search"]
     whole = f"search {parts['search']:.1f}" if "search" in parts else ""
     return ", ".join(outer) + (f"; {whole} ms ({', '.join(inner)})" if whole else " ms")
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key of the configuration, as its schema declares it."""
-
-    name: str
-    type: str
-    default: str
-    meaning: str
-
-
-def configuration_keys() -> list[Key]:
-    """All keys in the order of the schema; the meaning is the comment beside the field."""
-    from repair.config import Config
-
-    def walk(section: Any, prefix: str) -> list[Key]:
-        source = inspect.getsource(section)
-        keys = []
-        for item in fields(section):
-            name = f"{prefix}{item.name}"
-            value = item.default if item.default_factory is MISSING else item.default_factory()
-            if is_dataclass(value):
-                keys += walk(type(value), f"{name}.")
-                continue
-            line = re.search(rf"^    {item.name}:[^#\n]*(?:#\s*(.*))?$", source, re.MULTILINE)
-            meaning = (line.group(1) if line else None) or ""
-            default = (
-                "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
-            )
-            keys.append(Key(name, str(item.type).replace(" | None", " or null"), default, meaning))
-        return keys
-
-    return walk(Config, "")
-
-
-def key_table() -> str:
-    """Every configuration key with default, choices or range, and meaning, as a Markdown table."""
-    from repair.config import CHOICES, RANGES
-
-    lines = ["| key | default | possible | meaning |", "|---|---|---|---|"]
-    for key in configuration_keys():
-        meaning, possible = key.meaning, key.type
-        if key.name in CHOICES:
-            possible = ", ".join(f"`{c}`" for c in CHOICES[key.name])
-            meaning = "" if " | " in meaning and ":" not in meaning else meaning
-        elif key.name in RANGES:
-            low, high = RANGES[key.name]
-            possible = f"{low:g} to {high:g}" + (" or null" if key.type.endswith("null") else "")
-        lines.append(
-            f"| `{key.name}` | `{key.default}` | {possible} | {meaning.replace('|', chr(92) + '|')} |"
-        )
-    return "\n".join(lines)
-
-
-def preset_summary(name: str) -> str:
-    """The comment at the head of a preset's file."""
-    import repair.config
-
-    lines = (
-        (Path(repair.config.__file__).with_name("presets") / f"{name}.yaml").read_text("utf-8").splitlines()
-    )
-    head = list(takewhile(lambda line: line.startswith("#"), lines))
-    return " ".join(line.lstrip("# ") for line in head)

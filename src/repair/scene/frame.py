@@ -7,85 +7,21 @@ polyline is smoothed first, and position, heading and curvature then come from o
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from repair.errors import ScenarioError
-from repair.extremes import largest, smallest
-from repair.types import Array, FrenetTrajectory, Points, frozen
+from repair.arrays import Array, Points, frozen, smallest
+from repair.curves.base import FrenetTrajectory
+from repair.curves.plane import STANDSTILL, CartesianPath
+from repair.scene.smoothing import arc_length_table, cleaned, resampled, smoothed
 
-__all__ = ["STANDSTILL", "CartesianPath", "FrenetFrame"]
-
-STANDSTILL = 1e-2
-"""Below this speed [m/s] the direction of motion is noise: a trajectory's heading is held."""
-
-_STEP = 0.25  # knot distance of the table [m]
-_MIN_LENGTH = 1.0  # a shorter path has no meaningful direction [m]
+__all__ = ["FrenetFrame", "held_headings"]
 _DOMAIN = 0.05  # smallest 1 - kappa l at which a projection still counts as unique
 _NEWTON = 8
 # As arrays, because NumPy takes longer to convert a plain number than to multiply a row by it.
 _ZERO, _ONE = np.array(0.0), np.array(1.0)
-
-
-class CartesianPath(NamedTuple):
-    """A trajectory in the plane.
-
-    Attributes
-    ----------
-    t : (K,) array
-        Time [s].
-    xy : (K, 2) array
-        Position of the reference point [m].
-    heading : (K,) array
-        Direction of its velocity [rad], continuous; held where it stands, and not turned round
-        while reversing.
-    speed : (K,) array
-        Signed speed [m/s], negative while reversing.
-    step : (K - 1,) array
-        Distance from each sample to the next [m].
-    turn : (K - 1,) array
-        Change of heading from each sample to the next [rad].
-    slowest, longest, sharpest : float
-        Smallest speed, largest step and largest size of a turn: what several checks ask for first. NaN
-        where one of the values is.
-    """
-
-    t: Array
-    xy: Array
-    heading: Array
-    speed: Array
-    step: Array
-    turn: Array
-    slowest: float
-    longest: float
-    sharpest: float
-
-    @classmethod
-    def through(cls, t: Array, plane: Points, heading: Array, speed: Array, slowest: float) -> CartesianPath:
-        """The path through points x + iy (K,), K > 0, of which heading, speed and smallest speed are known.
-
-        Jumps of the heading by full turns are taken out.
-        """
-        step = np.abs(plane[1:] - plane[:-1])
-        turn = heading[1:] - heading[:-1]
-        longest = sharpest = 0.0
-        if len(step):
-            longest, sharpest = largest(step), largest(np.abs(turn))
-            if not sharpest < np.pi:
-                heading = np.unwrap(heading)
-                turn = heading[1:] - heading[:-1]
-                sharpest = largest(np.abs(turn))
-        xy = plane.view(np.float64).reshape(-1, 2)
-        return cls(t, xy, heading, speed, step, turn, slowest, longest, sharpest)
-
-    @property
-    def distance(self) -> Array:
-        """Distance driven since the first sample (K,) [m]."""
-        distance = np.zeros(len(self.t))
-        np.add.accumulate(self.step, out=distance[1:])
-        return distance
 
 
 class FrenetFrame:
@@ -164,10 +100,10 @@ class FrenetFrame:
         ScenarioError
             If the points are not finite, or the path is shorter than 1 m.
         """
-        clean = _clean(points)
+        clean = cleaned(points)
         if smoothing > 0.0:
-            clean = _clean(_smooth(_resample_chord(clean, spacing), smoothing))  # smoothing may fold a spike
-        table, length = _arc_length_table(clean)
+            clean = cleaned(smoothed(resampled(clean, spacing), smoothing))  # smoothing may fold a spike
+        table, length = arc_length_table(clean)
         return cls(table, length, max_lateral=max_lateral)
 
     # ------------------------------------------------------------------ evaluation
@@ -349,7 +285,7 @@ class FrenetFrame:
             heading = base + np.arctan2(sideways, forward)
             slowest = _least(speed)
         if not slowest >= STANDSTILL:
-            heading = _held(heading, base, np.abs(speed))
+            heading = held_headings(heading, base, np.abs(speed))
         if sign is not None:
             speed = speed * sign
             slowest = _least(speed)
@@ -382,7 +318,7 @@ def _pairs(x: Array, y: Array) -> Array:
     return made
 
 
-def _held(heading: Array, fallback: Array, pace: Array) -> Array:
+def held_headings(heading: Array, fallback: Array, pace: Array) -> Array:
     """Headings with those of standing samples taken from the last (else the first) moving one."""
     moving = pace >= STANDSTILL
     count = np.count_nonzero(moving)
@@ -394,81 +330,3 @@ def _held(heading: Array, fallback: Array, pace: Array) -> Array:
         return held
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
     return np.asarray(heading[np.where(last < 0, int(np.argmax(moving)), last)])
-
-
-def _clean(points: npt.ArrayLike) -> Array:
-    path = np.asarray(points, dtype=np.float64)
-    if path.ndim != 2 or path.shape[1] != 2:
-        raise ScenarioError(f"a path needs points of shape (M, 2), not {path.shape}")
-    if not np.isfinite(path).all():
-        raise ScenarioError("a path has a point that is not finite")
-    keep = [0] if len(path) else []
-    for index in range(1, len(path)):
-        if np.hypot(*(path[index] - path[keep[-1]])) > 1e-3:
-            keep.append(index)
-    path = path[keep]
-    if len(path) < 2 or np.sum(np.hypot(*np.diff(path, axis=0).T)) < _MIN_LENGTH:
-        raise ScenarioError(f"a path is shorter than {_MIN_LENGTH:g} m and cannot carry a Frenet frame")
-    return path
-
-
-def _chord(path: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-
-
-def _resample_chord(path: Array, spacing: float) -> Array:
-    chord = _chord(path)
-    query = np.linspace(0.0, chord[-1], max(int(np.ceil(chord[-1] / spacing)), 4) + 1)
-    return np.stack([np.interp(query, chord, path[:, 0]), np.interp(query, chord, path[:, 1])], axis=1)
-
-
-def _smooth(path: Array, tolerance: float) -> Array:
-    """Penalise third differences (jumps of curvature) as hard as the tolerance allows.
-
-    Whittaker's smoother: minimise ``|x - p|^2 + w |D3 x|^2``. The weight is the largest of a
-    geometric series at which no point moves farther than ``tolerance``. The ends are held.
-    """
-    from scipy.linalg import solveh_banded
-
-    count = len(path)
-    if count < 5:
-        return path
-    difference = np.array([-1.0, 3.0, -3.0, 1.0])
-    band = np.zeros((4, count))  # lower form of D3' D3
-    for i in range(4):
-        for j in range(i + 1):
-            band[i - j, j : j + count - 3] += difference[i] * difference[j]
-    identity = np.ones(count)
-    identity[[0, -1]] = 1e9
-    weights = 2.0 ** np.arange(18.0, -10.0, -1.0)
-    for weight in weights:
-        matrix = weight * band
-        matrix[0] += identity
-        smooth = np.asarray(solveh_banded(matrix, identity[:, None] * path, lower=True))
-        if np.max(np.hypot(*(smooth - path).T)) <= tolerance:
-            return smooth
-    return path
-
-
-def _arc_length_table(path: Array) -> tuple[Array, float]:
-    """Points at uniform arc length along the C2 spline through ``path``, and the length."""
-    from scipy.interpolate import CubicSpline
-
-    chord = _chord(path)
-    spline = CubicSpline(chord, path, bc_type="natural")
-    nodes, weights = np.polynomial.legendre.leggauss(5)
-    fine = np.unique(np.concatenate([np.linspace(0.0, chord[-1], int(chord[-1] / _STEP) + 2), chord]))
-    half = np.diff(fine) / 2.0
-    middle = (fine[1:] + fine[:-1]) / 2.0
-    speed = np.linalg.norm(spline(middle[:, None] + half[:, None] * nodes, 1), axis=-1)
-    arc = np.concatenate([[0.0], np.cumsum(half * (speed @ weights))])
-    length = float(arc[-1])
-    target = np.linspace(0.0, length, max(int(np.ceil(length / _STEP)), 4) + 1)
-    parameter = np.interp(target, arc, fine)
-    # one Newton step on arc(parameter) = target takes the linear interpolation's error away
-    cell = np.clip(np.searchsorted(fine, parameter, side="right") - 1, 0, len(half) - 1)
-    span = (parameter - fine[cell]) / 2.0
-    inside = np.linalg.norm(spline((fine[cell] + span)[:, None] + span[:, None] * nodes, 1), axis=-1)
-    error = arc[cell] + span * (inside @ weights) - target
-    parameter = np.clip(parameter - error / np.linalg.norm(spline(parameter, 1), axis=-1), 0.0, chord[-1])
-    return np.asarray(spline(parameter)), length

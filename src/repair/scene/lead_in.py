@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from repair.arrays import Array
 from repair.errors import ScenarioError
 from repair.scene.frame import FrenetFrame
-from repair.scene.vehicle import Vehicle
-from repair.types import Array
+from repair.vehicle.parameters import Vehicle
 
 __all__ = ["LeadIn", "drive_path", "largest_curvature"]
 

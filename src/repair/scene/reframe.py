@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.scene.bounds import crossings, lateral_bounds
+from repair.arrays import Array, frozen
 from repair.scene.frame import FrenetFrame
-from repair.scene.route import lanes_of
-from repair.types import Array, frozen
+from repair.scene.road.bounds import crossings, lateral_bounds
+from repair.scene.road.lanes import lanes_of
 
 if TYPE_CHECKING:
-    from repair.scene.commonroad import Scene
+    from repair.scene.scene import Scene
 
 __all__ = ["as_ego", "reframe"]
 

@@ -8,28 +8,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
+from repair.backend.base import RepairBackend
 from repair.config import Config
 from repair.errors import BackendError
-from repair.types import RepairBackend
 
 __all__ = ["available", "backend_names", "make_backend", "register"]
 
 #: name -> (module, factory in it, packages it needs, one line for people)
 _BACKENDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
     "ego": (
-        "repair.solvers.ego",
+        "repair.solvers.ego.backend",
         "make",
         ("scipy",),
         "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
     ),
     "casadi": (
-        "repair.solvers.casadi_nlp",
+        "repair.solvers.casadi.backend",
         "make",
         ("casadi",),
         "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
     ),
     "qptr": (
-        "repair.baselines.qptr",
+        "repair.baselines.qptr.backend",
         "make",
         ("qpsolvers",),
         "Bernstein QP in a convex driving corridor (baseline)",

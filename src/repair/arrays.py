@@ -1,0 +1,47 @@
+"""Arrays of numbers: their types, read-only copies, extremes, and plain numbers for files."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Array", "Points", "column", "frozen", "largest", "number", "smallest"]
+
+#: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
+Array = npt.NDArray[np.floating[Any]]
+#: Points, or directions, of the plane as complex numbers x + iy: one call where coordinates take two.
+Points = npt.NDArray[np.complexfloating[Any, Any]]
+
+
+def frozen(values: npt.ArrayLike) -> Array:
+    """Copy ``values`` into a read-only float64 array."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def largest(values: Array) -> float:
+    """Largest of at least one number; NaN if one of them is."""
+    return float(values.item(values.argmax()))
+
+
+def smallest(values: Array) -> float:
+    """Smallest of at least one number; NaN if one of them is."""
+    return float(values.item(values.argmin()))
+
+
+def number(value: float | None, digits: int = 9) -> float | None:
+    """A finite plain float, or None. Nine digits: 2.9, not 2.9000000000000004."""
+    if value is None or not math.isfinite(value):
+        return None
+    return round(float(value), digits) + 0.0
+
+
+def column(values: Any, digits: int = 9) -> list[float | None]:
+    return [number(v, digits) for v in np.asarray(values, dtype=np.float64).tolist()]

@@ -1,0 +1,150 @@
+"""TTR from fixed evasive manoeuvres: the latest moment at which full braking, kick-down or steering helps.
+
+TTB, TTK and TTS (Hillenbrand et al., *A multilevel collision mitigation approach*, T-ITS 2006; the
+names and the conventions of :attr:`EvasiveResult.ttr` and its parts are those of CommonRoad-CriMe:
+-inf where no such manoeuvre helps, inf without a conflict). Every manoeuvre is a trajectory along the
+reference's own path, on a point mass or within the steering limits of a kinematic single-track model;
+it stands when it has come to a stop, where a simulation at constant acceleration would reverse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.baselines.evasive.maneuvers import EvasiveCurve, EvasiveManeuver, maneuvers_at
+from repair.baselines.evasive.settings import EvasiveConfig
+from repair.curves.base import SplicedCurve
+from repair.world.occupancy import first_entry
+
+if TYPE_CHECKING:
+    from repair.situation import Prepared
+
+__all__ = ["EvasiveResult", "EvasiveStatus", "evasive_ttr"]
+
+
+class EvasiveStatus(str, Enum):
+    """Why a Time-To-X has its value."""
+
+    FOUND = "found"
+    NO_CONFLICT = "no_conflict"
+    NEVER = "never"
+    ALREADY_COLLIDING = "already_colliding"
+
+    @property
+    def value_without(self) -> float:
+        """The value [s] that stands for the status where it is not ``found``."""
+        return float("inf") if self is EvasiveStatus.NO_CONFLICT else -float("inf")
+
+
+@dataclass(frozen=True)
+class EvasiveResult:
+    """Times by CommonRoad-CriMe's conventions [s]: -inf for "no such manoeuvre", inf for "no conflict".
+
+    Attributes
+    ----------
+    ttb, ttk, tts_left, tts_right : float
+        Latest start of full braking, kick-down, and steering to either side.
+    ttr : float
+        The latest of them.
+    maneuver : EvasiveManeuver or None
+        Which one that is.
+    status : dict
+        Why each of the four has its value.
+    curves : dict
+        The manoeuvre from its Time-To-X on, for those that exist.
+    """
+
+    ttb: float
+    ttk: float
+    tts_left: float
+    tts_right: float
+    ttr: float
+    maneuver: EvasiveManeuver | None
+    status: dict[EvasiveManeuver, EvasiveStatus]
+    curves: dict[EvasiveManeuver, EvasiveCurve] = field(default_factory=dict)
+
+    @property
+    def tts(self) -> float:
+        """The later of steering left and right [s]."""
+        return max(self.tts_left, self.tts_right)
+
+    @property
+    def curve(self) -> EvasiveCurve | None:
+        """The manoeuvre behind ``ttr``."""
+        return None if self.maneuver is None else self.curves.get(self.maneuver)
+
+
+def evasive_ttr(prepared: Prepared, settings: EvasiveConfig | None = None) -> EvasiveResult:
+    """TTB, TTK, TTS and TTR of a prepared scene's reference.
+
+    Parameters
+    ----------
+    prepared : repair.api.Prepared
+    settings : EvasiveConfig, optional
+        By default those of the prepared scene's configuration.
+
+    Returns
+    -------
+    EvasiveResult
+        Each time is the last scenario step before the TTC from which the manoeuvre avoids every
+        collision until the end of the repairs (``prepared.t_end``).
+    """
+    settings = settings or prepared.config.evasive
+    ttc = prepared.conflict.time
+    if ttc == float("inf"):
+        return _uniform(EvasiveStatus.NO_CONFLICT)
+    if prepared.conflict.contact_time <= 0.0:
+        return _uniform(EvasiveStatus.ALREADY_COLLIDING)
+    latest = max(int(np.ceil(ttc / prepared.scene.dt - 1e-6)) - 1, 0)
+    times: dict[EvasiveManeuver, float] = {}
+    curves: dict[EvasiveManeuver, EvasiveCurve] = {}
+    for maneuver in EvasiveManeuver:
+        times[maneuver] = -float("inf")
+        for step in range(latest, -1, -1):
+            curve = _escape(prepared, settings, maneuver, step * prepared.scene.dt)
+            if curve is not None:
+                times[maneuver], curves[maneuver] = curve.t_start, curve
+                break
+    status = {m: EvasiveStatus.FOUND if m in curves else EvasiveStatus.NEVER for m in EvasiveManeuver}
+    best = max(curves, key=lambda m: times[m], default=None)
+    brake, kick, left, right = (times[m] for m in EvasiveManeuver)
+    return EvasiveResult(brake, kick, left, right, max(times.values()), best, status, curves)
+
+
+def _uniform(status: EvasiveStatus) -> EvasiveResult:
+    value = status.value_without
+    return EvasiveResult(value, value, value, value, value, None, dict.fromkeys(EvasiveManeuver, status))
+
+
+def _escape(
+    prepared: Prepared, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float
+) -> EvasiveCurve | None:
+    """The first variant of a manoeuvre from ``t`` on that is free until the end of the repairs."""
+    steering = maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT)
+    road = steering or prepared.conflict.kind == "off_road"
+    for curve in maneuvers_at(
+        prepared.reference, t, prepared.t_end, maneuver, settings, prepared.scene.vehicle
+    ):
+        if _is_free(prepared, curve, settings.collision, road):
+            return curve
+    return None
+
+
+def _is_free(prepared: Prepared, curve: EvasiveCurve, collision: str, road: bool) -> bool:
+    checker = prepared.checker
+    driven = SplicedCurve(prepared.reference, curve, curve.t_start)
+    if collision == "boxes":
+        times = checker.times(prepared.t_end)
+        if first_entry(prepared.occupancy, driven.sample(times[times >= curve.t_start - 1e-9])) is not None:
+            return False
+    elif checker.contact(driven, prepared.t_end) is not None:
+        return False
+    if not road or checker.road is None:
+        return True
+    states = checker.drive(driven, prepared.t_end)
+    late = states.t >= curve.t_start - 1e-9
+    return checker.road.first_off_road(states.x[late], states.y[late], states.orientation[late]) is None

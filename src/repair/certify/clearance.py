@@ -1,0 +1,89 @@
+"""Distance to the inflated boxes, by hull and by sampling."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.certify.certificate import SAMPLE, CertificateRow, at_least
+from repair.certify.hull import cut_pieces, pieces_of
+from repair.curves.bspline import UniformBSpline
+from repair.world.boxes import Occupancy
+
+if TYPE_CHECKING:
+    from repair.curves.bernstein import BernsteinCurve
+    from repair.situation import Prepared
+
+__all__ = ["allowed_depth", "clearance_rows"]
+
+
+def allowed_depth(content: dict[str, Any], prepared: Prepared) -> float:
+    """How far into the inflated boxes the repair may go [m, negative]: a hard backend says itself.
+
+    Boxes in (s, l) are wider than the vehicles in them; a soft backend may enter them as far as the
+    most that hard ones are allowed to (``repair.relax``), and the true rectangles have a row of their own.
+    """
+    best = [p for p in content["probes"] if p["feasible"] and p["t_rep_s"] == content["f_ttr_s"]]
+    if best and "obstacles" in best[0]["residuals"] and best[0].get("margin_m") is not None:
+        return min(0.0, float(best[0]["margin_m"]))
+    return min([0.0, *prepared.config.repair.relax])
+
+
+def clearance_rows(
+    curve: UniformBSpline | BernsteinCurve, occupancy: Occupancy, dt: float, t_end: float, allowed: float
+) -> list[CertificateRow]:
+    """Distance to the nearest inflated box, by hull and by sampling; negative inside of it.
+
+    ``allowed`` is how far into a box the repair may go at most.
+
+    The distance to a box is the largest of the four signed distances to its sides. Pieces are cut at
+    the scenario's steps: in between the sides move linearly, and the Bernstein points of curve minus
+    side bound their distance.
+    """
+    if not len(occupancy):
+        return []
+    t_end = min(t_end, curve.t_end)
+    points, duration = pieces_of(curve)
+    steps = np.arange(np.ceil(curve.t_start / dt), np.floor(t_end / dt + 1e-6) + 1) * dt
+    grid = np.linspace(curve.t_start, t_end, max(2, round((t_end - curve.t_start) / (2 * SAMPLE))) + 1)
+    knots = curve.t_start + np.arange(len(points) + 1) * duration
+    edges = np.unique(np.round(np.concatenate([steps, grid, knots[knots <= t_end]]), 10))
+    edges = edges[(edges >= curve.t_start) & (edges <= t_end)]
+    edges = edges[np.concatenate([[True], np.diff(edges) > 1e-8])]
+    start, end = edges[:-1], edges[1:]
+    piece = np.clip(np.floor(((start + end) / 2 - curve.t_start) / duration), 0, len(points) - 1).astype(
+        np.intp
+    )
+    origin = curve.t_start + piece * duration
+    u0, u1 = (np.clip((x - origin) / duration, 0.0, 1.0) for x in (start, end))
+    fine = cut_pieces(points[piece], u0, u1)
+    sides_start, sides_end = _sides(occupancy, start), _sides(occupancy, end)
+    share = np.linspace(0.0, 1.0, fine.shape[1])[None, :, None]
+    least, sampled = np.inf, np.inf
+    at = curve.sample(edges).position
+    at_sides = _sides(occupancy, edges)
+    for k in range(len(occupancy)):
+        line = (1.0 - share) * sides_start[k][:, None] + share * sides_end[k][:, None]
+        distance = np.max(np.min(_signed(fine) - line, axis=1), axis=1)
+        least = min(least, float(np.nanmin(distance, initial=np.inf)))
+        sampled = min(sampled, float(np.nanmin(np.max(_signed(at) - at_sides[k], axis=-1), initial=np.inf)))
+    if not np.isfinite(sampled):
+        return []
+    return [
+        at_least("distance to the nearest inflated obstacle", least, allowed, "exact", "m"),
+        at_least("distance to the nearest inflated obstacle", sampled, allowed, "sampled", "m"),
+    ]
+
+
+def _sides(occupancy: Occupancy, times: Array) -> Array:
+    """Signed sides (N, K, 4) of the boxes: behind, ahead, right, left."""
+    lower, upper = occupancy.at(times)
+    return np.stack([-lower[..., 0], upper[..., 0], -lower[..., 1], upper[..., 1]], axis=-1)
+
+
+def _signed(position: Array) -> Array:
+    """Positions (..., 2) in the signs of :func:`_sides`."""
+    s, l = position[..., 0], position[..., 1]  # noqa: E741
+    return np.stack([-s, s, -l, l], axis=-1)

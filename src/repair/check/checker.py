@@ -1,0 +1,316 @@
+"""Is it feasible? Limits, collision, road, kinematics; the same judge for every backend.
+
+The vehicle is driven along the curve (kinematic single-track states that are consistent with the
+centre's path), and what is judged are those states: exactly what a solution file will hold.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.arrays import Array, Points, frozen, largest, smallest
+from repair.check.peaks import Peaks, peaks
+from repair.check.settings import CheckerConfig
+from repair.check.verdict import Reason, Verdict, Violation
+from repair.curves.base import Curve, FrenetTrajectory
+from repair.problem.limits import Limits
+from repair.problem.problem import RepairProblem
+from repair.vehicle.commonroad_ks import official_check
+from repair.vehicle.single_track import body_angles, drive, driven_states
+from repair.vehicle.states import DrivenStates
+from repair.vehicle.transitions import direct_check
+from repair.vehicle.transitions_fast import clearly_drivable
+from repair.world.boxes import Occupancy
+from repair.world.collision import CollisionWorld, Contact
+from repair.world.late import official_shifts
+from repair.world.occupancy import first_entry
+from repair.world.road import RoadBoundary
+from repair.world.road_corridor import RoadCorridor
+
+if TYPE_CHECKING:
+    from repair.curves.plane import CartesianPath
+    from repair.scene.scene import Scene
+
+__all__ = ["Checker"]
+
+# Speeds this far below zero [m/s] still count as standing, and limits are met up to this share:
+# a soft backend ends near its limits, not on them.
+STANDSTILL = 0.05
+SLACK = 0.01
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """The reference at all dense samples until ``t_end``; every check follows it for a step or two."""
+
+    reference: Curve
+    t_end: float
+    motion: Array
+    slip: Array
+
+
+class Checker:
+    """Judges curves in one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    limits : Limits
+    config : CheckerConfig
+    """
+
+    def __init__(self, scene: Scene, limits: Limits, config: CheckerConfig) -> None:
+        self.scene, self.limits, self.config = scene, limits, config
+        self.world = CollisionWorld(
+            scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps,
+            official_shifts(scene.scenario),
+        )  # fmt: skip
+        self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
+        self._corridor = RoadCorridor(self.road, scene.frame, scene.vehicle) if self.road else None
+        samples = np.arange(scene.n_steps * config.substeps + 1)
+        self._times = frozen(samples * (scene.dt / config.substeps))
+        self._followed: _Followed | None = None
+
+    def times(self, t_end: float) -> Array:
+        """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
+        steps = min(math.floor(t_end / self.scene.dt + 1e-6), self.scene.n_steps)
+        return self._times[: max(steps * self.config.substeps + 1, 0)]
+
+    def _path(self, curve: Curve, t_end: float) -> CartesianPath:
+        return self.scene.frame.cartesian(curve.sample(self.times(t_end)))
+
+    def _drive(self, path: CartesianPath, slip: float | None = None) -> DrivenStates:
+        vehicle = self.scene.vehicle
+        return drive(path.t, path.xy, path.heading, path.speed, path.distance, vehicle, slip0=slip)
+
+    def drive(self, curve: Curve, t_end: float) -> DrivenStates:
+        """Consistent vehicle states along the curve, densely sampled."""
+        return self._drive(self._path(curve, t_end))
+
+    def peaks(self, curve: Curve, t_end: float, t_from: float = 0.0) -> Peaks:
+        """Extremes over [t_from, t_end]."""
+        path = self._path(curve, t_end)
+        return peaks(path, path.t >= t_from - 1e-9)
+
+    def contact(self, curve: Curve, t_end: float) -> Contact | None:
+        """First contact of the true rectangles along the curve."""
+        states = self.drive(curve, t_end)
+        return self.world.contact(states.x, states.y, states.orientation)
+
+    def touching_at_start(self) -> set[int]:
+        """Obstacles that the ego's rectangle touches at t = 0."""
+        start = self.scene.initial_state
+        pose = (np.array([start.x]), np.array([start.y]), np.array([start.orientation]))
+        contact = self.world.contact(*pose)
+        return set() if contact is None else {contact.obstacle_id}
+
+    def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
+        """Verdict on ``curve`` after the reference until ``problem.t_rep``.
+
+        Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
+        """
+        first = max(math.floor(problem.t_rep / self.scene.dt + 1e-6) - 1, 0) * self.config.substeps
+        times = self.times(problem.t_end)
+        after = curve.sample(times[times.searchsorted(problem.t_rep - 1e-9) :])
+        path, s, slip0 = self._spliced(problem, after, times, first)
+        if not _finite(path):
+            return _NOT_FINITE
+        slip, orientation = body_angles(path, self.scene.vehicle, slip0)
+        found = self._limits(path, len(path.t) - len(after), problem.t_rep) if self.config.limits else []
+        if self.config.margin:
+            found += self._margin(problem, curve, after)
+        found += self._clear(path, s, orientation, first)
+        # What is rejected already is not worth the drivability checker's time.
+        return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
+
+    def check_reference(self, reference: Curve, t_end: float) -> Verdict:
+        """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
+        path, s, slip, orientation = self._follow(reference, t_end)
+        if not _finite(path):
+            return _NOT_FINITE
+        found = self._clear(path, s, orientation, 0)
+        until = min((violation.time for violation in found), default=float("inf"))
+        return Verdict(tuple(found + self._kinematics(path, slip, orientation, until)))
+
+    def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
+        """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
+        times = self.times(t_end)
+        motion = _motion(reference.sample(times), len(times))
+        path = self.scene.frame.carry(times, motion)
+        slip, orientation = body_angles(path, self.scene.vehicle)
+        self._followed = _Followed(reference, t_end, motion, slip)
+        return path, motion[0], slip, orientation
+
+    def _kept(self, reference: Curve, t_end: float) -> _Followed:
+        """What was kept of the reference, at least until ``t_end``."""
+        kept = self._followed
+        while kept is None or kept.reference is not reference or kept.t_end < t_end:
+            self._follow(reference, t_end)
+            kept = self._followed  # another thread may have put its own reference there
+        return kept
+
+    def _spliced(
+        self, problem: RepairProblem, after: FrenetTrajectory, times: Array, first: int
+    ) -> tuple[CartesianPath, Array, float | None]:
+        """The reference from dense sample ``first`` on, then ``after``.
+
+        Also the arc lengths, and the slip angle to begin with; at the start there is no history and no
+        slip angle (None).
+        """
+        late, slip0 = len(times) - len(after), None
+        motion = _motion(after, len(times) - first)
+        if late:
+            kept = self._kept(problem.reference, problem.t_end)
+            motion[:, : late - first] = kept.motion[:, first:late]
+            slip0 = None if first == 0 else float(kept.slip[first])
+        return self.scene.frame.carry(times[first:], motion), motion[0], slip0
+
+    def _clear(self, path: CartesianPath, s: Array, orientation: Array, first_sample: int) -> list[Violation]:
+        """First contact with an obstacle and first departure from the road."""
+        found = []
+        centre = path.xy.view(np.complex128)[:, 0]
+        contact = self.world.contact_along(centre, orientation, first_sample, path.longest)
+        if contact is not None:
+            behind = " from behind" if contact.from_behind else ""
+            detail = f"obstacle {contact.obstacle_id}{behind}"
+            found.append(Violation(Reason.COLLISION, contact.time, detail))
+        index = self._off_road(s, centre, orientation)
+        if index is not None:
+            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), "the ego leaves the road"))
+        return found
+
+    def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
+        """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
+        if self.road is None or self._corridor is None:
+            return None
+        held = self._corridor.holds(s, centre, orientation)
+        if np.count_nonzero(held) == len(held):
+            return None
+        unsure = np.flatnonzero(~held)
+        left = centre[unsure]
+        index = self.road.first_off_road(left.real, left.imag, orientation[unsure])
+        return None if index is None else int(unsure[index])
+
+    def _margin(self, problem: RepairProblem, curve: Curve, after: FrenetTrajectory) -> list[Violation]:
+        """The paper's detectCollision on the repaired part, at the scenario's steps."""
+        if not self._enters(problem.occupancy, after):
+            return []
+        samples = self.times(problem.t_end)[:: self.config.substeps]
+        samples = samples[samples >= problem.t_rep - 1e-9]
+        entry = first_entry(problem.occupancy, curve.sample(samples))
+        if entry is None:
+            return []
+        time = float(samples[entry[0]])
+        return [Violation(Reason.MARGIN, time, f"obstacle {problem.occupancy.ids[entry[1]]}")]
+
+    def _enters(self, occupancy: Occupancy, dense: FrenetTrajectory) -> bool:
+        """Whether a box may be entered at a scenario's step; False is certain.
+
+        Where the boxes are tabulated at these very steps there is nothing to interpolate.
+        """
+        n, count = self.config.substeps, len(dense)
+        first = round(float(dense.t[0]) / self.scene.dt * n) if count else 0
+        skip = -first % n
+        if not len(occupancy) or count <= skip:
+            return False
+        rows = slice((first + skip) // n, (first + count - 1) // n + 1)
+        t = occupancy.t[rows]
+        inner = dense.t[skip::n]
+        if len(t) != len(inner) or max(abs(t[0] - inner[0]), abs(t[-1] - inner[-1])) > 1e-9:
+            return True
+        lower, upper = occupancy.lower[:, rows], occupancy.upper[:, rows]
+        s, l = dense.position[skip::n].T  # noqa: E741
+        inside = (lower[..., 0] < s) & (s < upper[..., 0])
+        if not np.count_nonzero(inside):
+            return False
+        inside &= lower[..., 1] < l
+        inside &= l < upper[..., 1]
+        return bool(np.count_nonzero(inside))
+
+    def _well_within_limits(self, path: CartesianPath, late: int) -> bool:
+        """Whether bounds of the peaks, which cost less than the peaks, meet the limits already.
+
+        No difference quotient is beyond the largest change of one sample to the next.
+        """
+        limits, since = self.limits, max(late - 1, 0)
+        if len(path.t) - since < 2:
+            return False
+        speed = path.speed[since:]
+        change = speed[1:] - speed[:-1]
+        rate = 1.0 / float(path.t[1] - path.t[0])
+        v_high = largest(speed)
+        a_low, a_high = smallest(change), largest(change)
+        lateral = max(-path.slowest, v_high) * path.sharpest
+        return (
+            path.slowest >= -STANDSTILL
+            and v_high <= limits.v_max
+            and a_low * rate >= limits.a_min
+            and a_high * rate <= limits.a_max
+            and lateral * rate <= limits.a_lat
+            and math.hypot(max(-a_low, a_high), lateral) * rate <= limits.a_total
+        )
+
+    def _limits(self, path: CartesianPath, late: int, t_rep: float) -> list[Violation]:
+        """Limits that are broken from the path's sample ``late`` on."""
+        if self._well_within_limits(path, late):
+            return []
+        limits, reached, more = self.limits, peaks(path, slice(late, None)), 1 + SLACK
+        v_low, v_high = reached.min_speed, reached.max_speed
+        a_low, a_high = reached.min_acceleration, reached.max_acceleration
+        lateral, total = reached.max_lateral_acceleration, reached.max_total_acceleration
+        checks = (
+            (v_low < -STANDSTILL, "reverses at {:.2f} m/s", -v_low),
+            (v_high > limits.v_max * more + 0.1, "speed {:.1f} m/s", v_high),
+            (a_low < limits.a_min * more, "brakes at {:.2f} m/s²", a_low),
+            (a_high > limits.a_max * more, "accelerates at {:.2f}", a_high),
+            (lateral > limits.a_lat * more, "lateral acceleration {:.2f} m/s²", lateral),
+            (total > limits.a_total * more, "total acceleration {:.2f} m/s²", total),
+        )
+        broken = [text.format(value) for bad, text, value in checks if bad]
+        return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
+
+    def _kinematics(
+        self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
+    ) -> list[Violation]:
+        """Direct check first; the drivability checker decides what is left before ``until``.
+
+        Judged are the scenario's steps of a path that begins at one.
+        """
+        dt, vehicle, official, n = (
+            self.scene.dt, self.scene.vehicle, self.config.official, self.config.substeps,
+        )  # fmt: skip
+        xy, speed, slip, orientation = path.xy[::n], path.speed[::n], slip[::n], orientation[::n]
+        if len(xy) < 2:
+            return []
+        if official != "always" and clearly_drivable(xy, speed, slip, orientation, dt, vehicle):
+            return []
+        states = driven_states(path.t[::n], xy, speed, slip, orientation, vehicle)
+        report = direct_check(states, dt, vehicle)
+        open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
+        open_ = open_[states.t[open_] < until]
+        for k in open_.tolist():
+            if official == "never" or not official_check(states, dt, vehicle, [k]).ok.all():
+                return [Violation(Reason.KINEMATICS, float(states.t[k]), report.limit(k))]
+        return []
+
+
+_NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
+
+
+def _motion(trajectory: FrenetTrajectory, count: int) -> Array:
+    """The last of ``count`` samples of s, l and their rates (4, count); those before are left open."""
+    motion = np.empty((4, count))
+    start = count - len(trajectory)
+    motion[:2, start:], motion[2:, start:] = trajectory.position.T, trajectory.velocity.T
+    return motion
+
+
+def _finite(path: CartesianPath) -> bool:
+    # A point or a heading that is not finite would make the longest step or the sharpest turn so.
+    if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
+        return True
+    return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))

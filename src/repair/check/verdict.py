@@ -1,0 +1,80 @@
+"""What the checker says of a trajectory, and where a reference stops being drivable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = ["Conflict", "Reason", "Verdict", "Violation"]
+
+
+class Reason(str, Enum):
+    """Why a trajectory is not feasible."""
+
+    COLLISION = "collision"
+    OFF_ROAD = "off_road"
+    KINEMATICS = "kinematics"
+    LIMITS = "limits"
+    MARGIN = "margin"
+    CHECKER_ERROR = "checker_error"
+    NOT_SOLVED = "not_solved"
+    NO_CORRIDOR = "no_corridor"
+    NO_PASSAGE = "no_passage"
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One reason, when it first holds [s], and the particulars in words."""
+
+    reason: Reason
+    time: float
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The checker's answer."""
+
+    violations: tuple[Violation, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """No violation of any kind."""
+        return not self.violations
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The reasons' words, in the order of checking."""
+        return tuple(v.reason.value for v in self.violations)
+
+    @property
+    def first_time(self) -> float:
+        """Time of the earliest violation [s], inf where there is none."""
+        return min((v.time for v in self.violations), default=float("inf"))
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Where the reference stops being drivable.
+
+    Attributes
+    ----------
+    time : float
+        TTC [s]: first scenario step at which the reference violates something; inf if never.
+    kind : str
+        ``margin`` (inflated occupancy entered), ``collision``, ``off_road``, ``kinematics`` or
+        ``none``.
+    obstacle_id : int or None
+    contact_time : float
+        First contact of the true rectangles [s], inf if never.
+    contact_id : int or None
+    from_behind : bool
+        The obstacle strikes the ego from behind.
+    """
+
+    time: float
+    kind: str = "none"
+    obstacle_id: int | None = None
+    contact_time: float = float("inf")
+    contact_id: int | None = None
+    from_behind: bool = False

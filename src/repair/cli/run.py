@@ -1,0 +1,97 @@
+"""``repair run``."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from repair.cli.arguments import configuration_arguments, resolve
+from repair.errors import RepairError
+from repair.paper.bundled import OFFICIAL_FILES, PAPER_SCENARIOS, find_scenario, paper_scenario
+
+if TYPE_CHECKING:
+    from repair.config import Config
+
+
+def run_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair run``."""
+    parser.add_argument(
+        "scenario", nargs="?", metavar="SCENARIO.xml",
+        help="CommonRoad file, also by its name in the folder COMMONROAD_SCENARIOS, or scenario_1 or "
+        "scenario_2, the bundled reconstructions; by default the paper's Scenario 1, from the official file "
+        f"{OFFICIAL_FILES['scenario_1']} where COMMONROAD_SCENARIOS has it, else reconstructed",
+    )  # fmt: skip
+    configuration_arguments(parser)
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="write result.json, the solution file and figures"
+    )
+    parser.add_argument("--json", action="store_true", help="print what result.json holds, and nothing else")
+    parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
+
+
+@contextmanager
+def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
+    """The scenario's file and the configuration; the paper's scenarios come with their presets."""
+    config = resolve(arguments)
+    name = arguments.scenario or config.scenario
+    default = arguments.preset if arguments.preset in PAPER_SCENARIOS else PAPER_SCENARIOS[0]
+    if arguments.preset is None and (name is None or name in PAPER_SCENARIOS):
+        arguments.preset = name or default
+        config = resolve(arguments)
+    with paper_scenario(default) if name is None else find_scenario(name) as path:
+        yield path, config
+
+
+class _Interrupts:
+    """Remembers that Ctrl-C was pressed: the search swallows it and returns what it has."""
+
+    def __init__(self) -> None:
+        self.seen = False
+
+    def __enter__(self) -> _Interrupts:
+        def handler(number: int, frame: Any) -> None:
+            self.seen = True
+            raise KeyboardInterrupt
+
+        try:
+            self.before = signal.signal(signal.SIGINT, handler)
+        except ValueError:  # not the main thread: whoever runs us handles it
+            self.before = None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.before is not None:
+            signal.signal(signal.SIGINT, self.before)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """One scenario; the result on stdout, and in files where a folder is given."""
+    with _Interrupts() as interrupts, _scenario(arguments) as (path, config):
+        from repair.api import repair
+        from repair.io.result_json import to_dict, to_json
+        from repair.report.text import summary
+        from repair.save import saved
+
+        result = repair(path, config)
+        content, problem = to_dict(result), None
+        written: list[Path] = []
+        if arguments.out is not None:
+            try:
+                content, written = saved(result, arguments.out, figure=not arguments.no_figure)
+            except RepairError as error:
+                problem = error
+        if arguments.json:
+            sys.stdout.write(to_json(content))
+        else:
+            print(summary(content, arguments.preset, written))
+        if problem is not None:
+            raise problem
+        if interrupts.seen:
+            print("repair: interrupted; what was found until then stands above", file=sys.stderr)
+            return 130
+    return 0

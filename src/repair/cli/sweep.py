@@ -1,0 +1,73 @@
+"""``repair sweep``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from repair.cli.arguments import SOURCES
+
+if TYPE_CHECKING:
+    pass
+
+
+def sweep_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair sweep``."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of CommonRoad files")
+    parser.add_argument(
+        "--backend", action="extend", nargs="+", metavar="NAME", help="one or more (default: ego)"
+    )
+    parser.add_argument(
+        "--reference", action="extend", nargs="+", choices=SOURCES, metavar="SOURCE",
+        help=f"one or more of {', '.join(SOURCES)} (default: planner)",
+    )  # fmt: skip
+    parser.add_argument("--preset", metavar="NAME")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="extend", nargs="+", default=[], dest="overrides"
+    )
+    parser.add_argument("--out", metavar="DIR", type=Path, help="write sweep.csv and sweep.json")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="worker processes")
+    parser.add_argument(
+        "--timeout", type=float, default=300.0, metavar="S", help="wall time for one file [s]"
+    )
+    parser.add_argument("--report", metavar="FILE.md", type=Path, help="write a report of the rows")
+    parser.add_argument(
+        "--certify",
+        action="store_true",
+        help="recompute every margin from the written files, as `repair certify`",
+    )
+    parser.add_argument("--no-official", action="store_true", help="leave CommonRoad's own checker out")
+
+
+def sweep(arguments: argparse.Namespace) -> int:
+    """Every file, backend and reference; prints the rows as CSV where no folder is given."""
+    from repair.study.rows import COLUMNS, SweepSettings
+    from repair.study.run import sweep as run_sweep
+    from repair.study.store import write_sweep
+
+    settings = SweepSettings(
+        backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"],
+        preset=arguments.preset, overrides=arguments.overrides, official=not arguments.no_official,
+        certify=arguments.certify, timeout=arguments.timeout, jobs=arguments.jobs,
+    )  # fmt: skip
+    rows = run_sweep(arguments.folder, settings)
+    if arguments.report is not None:
+        from repair.io.files import write_files
+        from repair.report.sweep import sweep_report
+
+        chosen = (("backend", settings.backends), ("reference", settings.references))
+        words = [f"--{k} {' '.join(v)}" for k, v in chosen]
+        text = sweep_report(rows, f"repair sweep {arguments.folder.name} {' '.join(words)}")
+        print(*write_files(arguments.report.parent, {arguments.report.name: text.encode()}))
+    if arguments.out is None and arguments.report is None:
+        import csv
+
+        table = csv.DictWriter(sys.stdout, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+    elif arguments.out is not None:
+        for path in write_sweep(rows, arguments.out, settings, arguments.folder):
+            print(path)
+    return 0

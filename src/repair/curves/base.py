@@ -1,0 +1,98 @@
+"""Trajectories in the Frenet frame: samples, what a curve is, and two curves joined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.arrays import Array
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Curve", "FrenetTrajectory", "SplicedCurve"]
+
+
+@dataclass(frozen=True)
+class FrenetTrajectory:
+    """A trajectory sampled in the Frenet frame.
+
+    Attributes
+    ----------
+    t : (K,) array
+        Time since the start of the scenario [s].
+    position, velocity, acceleration, jerk : (K, 2) array
+        ``[s, l]`` and its first three time derivatives [m, m/s, m/s², m/s³].
+    """
+
+    t: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def window(self, start: float, end: float) -> FrenetTrajectory:
+        """The samples with ``start - 1e-9 <= t <= end + 1e-9``."""
+        keep = (self.t >= start - 1e-9) & (self.t <= end + 1e-9)
+        return FrenetTrajectory(
+            self.t[keep], self.position[keep], self.velocity[keep],
+            self.acceleration[keep], self.jerk[keep],
+        )  # fmt: skip
+
+
+@runtime_checkable
+class Curve(Protocol):
+    """A trajectory that can be evaluated at any time of its span (a spline, a Bernstein chain)."""
+
+    @property
+    def t_start(self) -> float:
+        """Start of the span [s]."""
+        ...
+
+    @property
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        ...
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate at the times ``t`` (K,); outside the span the curve is extended from its end state."""
+        ...
+
+
+@dataclass(frozen=True)
+class SplicedCurve:
+    """The reference until ``t_rep``, the repaired curve after it."""
+
+    reference: Curve
+    repaired: Curve
+    t_rep: float
+
+    @property
+    def t_start(self) -> float:
+        """Start of the span [s]."""
+        return self.reference.t_start
+
+    @property
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        return self.repaired.t_end
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate either part."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        late = times >= self.t_rep - 1e-9
+        parts = [c.sample(times[m]) for c, m in ((self.reference, ~late), (self.repaired, late)) if m.any()]
+        if len(parts) == 1:
+            return parts[0]
+        columns = []
+        for name in ("position", "velocity", "acceleration", "jerk"):
+            column = np.empty((len(times), 2))
+            column[~late], column[late] = getattr(parts[0], name), getattr(parts[1], name)
+            columns.append(column)
+        return FrenetTrajectory(times, *columns)

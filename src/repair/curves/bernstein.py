@@ -1,0 +1,106 @@
+"""Piecewise Bernstein polynomials over time.
+
+A piece of degree n and duration h has control points Q_0 .. Q_n at the times k h / n of the piece
+(its Greville abscissae). The piece lies in their hull, a linear function of time has its own values
+as control points, and the k-th derivative has the control points n! / (n - k)! Delta^k Q / h^k
+(Farouki, *The Bernstein polynomial basis: a centennial retrospective*, 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import comb, factorial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.arrays import Array, frozen
+from repair.curves.base import FrenetTrajectory
+from repair.curves.sampling import DENSE, KEPT, evaluated, hold_ends
+
+__all__ = ["BernsteinCurve", "bernstein_basis", "derivative_map"]
+
+
+def bernstein_basis(u: npt.ArrayLike, degree: int) -> Array:
+    """Values (K, degree + 1) of the basis polynomials at ``u`` (K,) in [0, 1]."""
+    x = np.asarray(u, dtype=np.float64)[:, None]
+    k = np.arange(degree + 1)
+    binomial = np.array([comb(degree, i) for i in range(degree + 1)], dtype=np.float64)
+    return np.asarray(binomial * x**k * (1.0 - x) ** (degree - k))
+
+
+@dataclass(frozen=True)
+class BernsteinCurve:
+    """A chain of Bernstein pieces of equal duration; implements :class:`repair.curves.base.Curve`.
+
+    Attributes
+    ----------
+    t_start : float
+        Start of the first piece [s].
+    duration : float
+        Duration of each piece [s].
+    points : (M, n + 1, 2) array
+        Control points ``[s, l]`` [m] of the M pieces.
+    """
+
+    t_start: float
+    duration: float
+    points: Array
+
+    @property
+    def degree(self) -> int:
+        """Degree n of the pieces."""
+        return int(self.points.shape[1]) - 1
+
+    @property
+    def t_end(self) -> float:
+        """End of the last piece [s]."""
+        return self.t_start + len(self.points) * self.duration
+
+    def derivative_points(self, order: int) -> Array:
+        """Control points (M, n + 1 - order, 2) of a derivative; their hull bounds it."""
+        scale = factorial(self.degree) / factorial(self.degree - order) / self.duration**order
+        return np.asarray(scale * np.diff(self.points, n=order, axis=1))
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate position and three derivatives; beyond the span the end speed is held."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        pieces, width, _ = self.points.shape
+        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
+        made = _sampling_at if len(times) <= KEPT else _sampling_at.__wrapped__
+        matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
+        position, velocity, acceleration, jerk = evaluated(matrix, self.points.reshape(pieces * width, 2))
+        return FrenetTrajectory(times, position, velocity, acceleration, jerk)
+
+
+def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
+    """Values (N, 4 K) of position to jerk at the ``offsets`` since the start."""
+    tau = np.frombuffer(offsets) / duration
+    piece = np.clip(np.floor(tau + 1e-9), 0, pieces - 1).astype(np.intp)
+    u = np.clip(tau - piece, 0.0, 1.0)
+    rows = np.zeros((4, len(tau), pieces, degree + 1))
+    for order in range(4):
+        rows[order, np.arange(len(tau)), piece] = bernstein_basis(u, degree - order) @ derivative_map(
+            1, degree, duration, order
+        )
+    return frozen(np.ascontiguousarray(rows.reshape(4 * len(tau), -1).T))
+
+
+@lru_cache(maxsize=64)
+def _sampling_at(times: bytes, t_start: float, pieces: int, degree: int, duration: float) -> Any:
+    """The matrix for :func:`repair.curves.sampling.evaluated`; sparse where it is large."""
+    t_end = t_start + pieces * duration
+    matrix = hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, pieces, degree, duration))
+    if matrix.size <= 4 * DENSE:
+        return matrix
+    from scipy.sparse import csr_array
+
+    return csr_array(matrix.T)
+
+
+def derivative_map(pieces: int, degree: int, duration: float, order: int) -> Array:
+    """Block-diagonal map from control points to those of the ``order``-th derivative."""
+    scale = factorial(degree) / factorial(degree - order) / duration**order
+    return np.asarray(np.kron(np.eye(pieces), scale * np.diff(np.eye(degree + 1), n=order, axis=0)))

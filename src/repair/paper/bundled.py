@@ -1,0 +1,66 @@
+"""Which file a name means: a path, a name in COMMONROAD_SCENARIOS, or one of the paper's scenarios."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from repair.errors import ScenarioError
+
+__all__ = ["OFFICIAL_FILES", "PAPER_SCENARIOS", "find_scenario", "paper_scenario"]
+
+#: The paper's scenarios; each has a preset of the same name.
+PAPER_SCENARIOS = ("scenario_1", "scenario_2")
+#: Those that are published as CommonRoad files.
+OFFICIAL_FILES = {"scenario_1": "DEU_Flensburg-6_1_T-1.xml"}
+
+
+@contextmanager
+def find_scenario(name: str) -> Iterator[Path]:
+    """The file that ``name`` means; a reconstruction only exists inside of the ``with`` block.
+
+    Parameters
+    ----------
+    name : str
+        A path; a file's name, with or without ``.xml``, in the folder COMMONROAD_SCENARIOS; or one of
+        :data:`PAPER_SCENARIOS`, which always gives the reconstruction.
+
+    Raises
+    ------
+    ScenarioError
+        If COMMONROAD_SCENARIOS is set and the file is neither there nor here.
+    """
+    path, folder = Path(name), os.environ.get("COMMONROAD_SCENARIOS")
+    candidates = [path]
+    if folder and not path.is_absolute():
+        candidates += [Path(folder) / name, Path(folder) / f"{name}.xml"]
+    existing = next((p for p in candidates if p.is_file()), None)
+    if existing is None and name in PAPER_SCENARIOS:
+        with _reconstruction(name) as written:
+            yield written
+        return
+    if existing is None and folder and not path.is_absolute() and not path.exists():
+        raise ScenarioError(f"{name}: no such file, neither here nor in COMMONROAD_SCENARIOS={folder}")
+    yield path if existing is None else existing
+
+
+@contextmanager
+def paper_scenario(name: str) -> Iterator[Path]:
+    """The official file of a scenario where COMMONROAD_SCENARIOS has it, else its reconstruction."""
+    folder, file = os.environ.get("COMMONROAD_SCENARIOS"), OFFICIAL_FILES.get(name)
+    if folder and file and (Path(folder) / file).is_file():
+        yield Path(folder) / file
+        return
+    with _reconstruction(name) as written:
+        yield written
+
+
+@contextmanager
+def _reconstruction(name: str) -> Iterator[Path]:
+    from repair.paper.synthetic import write_scenario
+
+    with tempfile.TemporaryDirectory(prefix="repair-") as aside:
+        yield write_scenario(name, Path(aside))

@@ -1,0 +1,163 @@
+"""From a scene and its reference to repair problems: limits, room, culling, sides of passing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.arrays import Array, frozen
+from repair.config import Config
+from repair.curves.base import Curve, FrenetTrajectory
+from repair.problem.limits import Limits
+from repair.problem.passing import open_passings
+from repair.problem.problem import Maneuver, RepairProblem
+from repair.problem.surroundings import Surroundings, surroundings
+from repair.problem.tables import Grid
+from repair.scene.road.bounds import LateralBounds
+from repair.world.boxes import Occupancy
+from repair.world.occupancy import near, relevant
+
+if TYPE_CHECKING:
+    from repair.scene.scene import Scene
+
+__all__ = ["ProblemFactory"]
+# Where the lateral room is looked up, from the hindmost to the foremost place within reach.
+_SHARES = frozen(np.linspace(0.0, 1.0, 50))
+
+
+@dataclass(frozen=True)
+class ProblemFactory:
+    """Makes the repair problems of one scene and reference (a :class:`repair.search.probe.ProblemSource`).
+
+    Attributes
+    ----------
+    scene : Scene
+    config : Config
+    limits : Limits
+    occupancy : Occupancy
+        All obstacles, inflated.
+    reference : Curve
+    t_end : float
+        End of every repair [s].
+    """
+
+    scene: Scene
+    config: Config
+    limits: Limits
+    occupancy: Occupancy
+    reference: Curve
+    t_end: float
+
+    @cached_property
+    def bounds(self) -> LateralBounds:
+        """Lateral room of the reference point, as ``repair.lateral`` says."""
+        wide = {"lane": self.scene.lane, "same_direction": self.scene.same_direction, "road": self.scene.road}
+        return wide.get(self.config.repair.lateral, self.scene.lane)
+
+    @cached_property
+    def _grid(self) -> Grid | None:
+        return Grid.over(self.occupancy, self.reference, self.t_end, self.scene.dt)
+
+    @cached_property
+    def _axis(self) -> tuple[Array, Array]:
+        s0 = float(self.scene.start[0, 0])
+        s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
+        return frozen(s), frozen(self.scene.frame.curvature(s))
+
+    def relaxed(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
+        """The problems again with smaller and smaller margins, as ``repair.relax`` lists them."""
+        for margin in self.config.repair.relax:
+            problems = self.at(t_rep, margin)
+            if problems:
+                yield problems
+
+    def at(self, t_rep: float, margin: float | None = None) -> tuple[RepairProblem, ...]:
+        """One problem for each open side of passing, the gentlest guide first.
+
+        Parameters
+        ----------
+        margin : float, optional
+            Distance to the inflated boxes [m]; negative values allow into them. By default
+            ``repair.margin``.
+        """
+        settings = self.config.repair
+        margin = settings.margin if margin is None else margin
+        lateral = settings.lateral != "none"
+        step = self.scene.dt
+        if t_rep > self.t_end - step + 1e-9:
+            return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
+        count = math.ceil((self.t_end - t_rep) / step - 1e-6)
+        times = t_rep + step * np.arange(count + 1)
+        reference, start, occupancy, boxes = self._scenery(t_rep, times, margin, lateral)
+        s, curvature = self._axis
+        passings = open_passings(
+            reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature), boxes
+        )
+        return tuple(
+            RepairProblem(
+                reference=self.reference,
+                t_rep=t_rep,
+                t_end=self.t_end,
+                start=start,
+                occupancy=occupancy,
+                bounds=self.bounds,
+                limits=self.limits,
+                clearance=settings.clearance,
+                margin=margin,
+                passing=passing,
+                curvature_s=s,
+                curvature=curvature,
+                dt=step,
+                # Who keeps the path needs no sideways freedom, and without it the vehicle can be
+                # brought to a stop on any path that it can drive at all.
+                strict=not settings.relax,
+                lateral=lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
+            )
+            for passing in passings
+        )
+
+    def _scenery(
+        self, t_rep: float, times: Array, margin: float, lateral: bool
+    ) -> tuple[FrenetTrajectory, Array, Occupancy, Surroundings]:
+        """Reference, state at t_rep, obstacles within reach, and where these meet the reference."""
+        grid = self._grid
+        first = None if grid is None else grid.index(t_rep)
+        if grid is None or first is None:
+            reference = self.reference.sample(times)
+            start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+            occupancy = self._within_reach(start, t_rep, reference.position, lateral)
+            return reference, start, occupancy, surroundings(reference, occupancy, margin)
+        reference, start = grid.trajectory(first, times), grid.states[first]
+        reach, room = self._reach(start, t_rep, grid.rightmost[first], grid.leftmost[first], lateral)
+        rows = near(grid.swept[..., first:], reach, room).nonzero()[0]
+        occupancy = grid.occupancy.select(rows) if len(rows) < len(grid.occupancy) else grid.occupancy
+        return reference, start, occupancy, grid.surroundings(first, rows, occupancy, margin)
+
+    def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:
+        sideways = reference[:, 1]
+        reach, room = self._reach(start, t_rep, float(sideways.min()), float(sideways.max()), lateral)
+        return relevant(self.occupancy, t_rep, self.t_end, np.array(reach), np.array(room))
+
+    def _reach(
+        self, start: Array, t_rep: float, rightmost: float, leftmost: float, lateral: bool
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Smallest and largest s, and l, that the ego can be at from a state on.
+
+        Parameters
+        ----------
+        rightmost, leftmost : float
+            Smallest and largest l of the reference from there on [m]: who may not move sideways keeps it.
+        """
+        duration = self.t_end - t_rep
+        s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
+        behind, ahead = s0 - 1.0, s0 + v0 * duration + 0.5 * self.limits.a_max * duration**2 + 1.0
+        if lateral:
+            right, left = self.bounds.at(behind + (ahead - behind) * _SHARES)
+            rightmost, leftmost = float(right.min()), float(left.max())
+        margin = self.config.repair.margin + self.config.repair.clearance
+        return (behind, ahead), (rightmost - margin, leftmost + margin)

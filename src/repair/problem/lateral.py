@@ -1,0 +1,95 @@
+"""Lateral motions past the first obstacle in conflict."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.curves.base import FrenetTrajectory
+from repair.problem.limits import Limits
+from repair.problem.problem import Maneuver
+from repair.problem.surroundings import Surroundings
+from repair.scene.road.bounds import LateralBounds
+
+__all__ = ["LateralProfile", "lateral_profiles"]
+
+
+class LateralProfile(NamedTuple):
+    """One lateral motion l(t) (K,) with its derivatives and cost."""
+
+    maneuver: Maneuver | None  # None: keeps the path; yield or go ahead is decided by the speed
+    l: Array  # noqa: E741
+    rate: Array
+    acceleration: Array | float
+    cost: float
+
+
+# Coefficients of x^3, x^4, x^5 by what is left of the way, the speed and the acceleration at x = 1.
+_QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
+
+
+def _quintics(start: Array, target: Array, duration: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """Quintics (Q, K) from (l, l', l'') to (target, 0, 0) within the durations (Q,), then constant."""
+    l0, v0, a0 = start.tolist()
+    d = np.maximum(duration, 1e-3)
+    speed, bend = v0 * d, a0 * d**2
+    rest = np.array([target - l0 - speed - 0.5 * bend, -speed - bend, -bend])
+    c3, c4, c5 = (_QUINTIC @ rest)[..., None]
+    d = d[:, None]
+    u = np.minimum(tau, d)
+    x = u / d
+    square = x * x
+    position = l0 + (v0 + 0.5 * a0 * u) * u + ((c5 * x + c4) * x + c3) * (square * x)
+    rate = v0 + a0 * u + ((5.0 * c5 * x + 4.0 * c4) * x + 3.0 * c3) * square / d
+    acceleration = a0 + ((20.0 * c5 * x + 12.0 * c4) * x + 6.0 * c3) * x / d**2
+    moving = tau <= d
+    return position, rate * moving, acceleration * moving
+
+
+def lateral_profiles(
+    start: Array,
+    tau: Array,
+    reference: FrenetTrajectory,
+    boxes: Surroundings,
+    limits: Limits,
+    bounds: LateralBounds,
+    margin: float,
+    lateral: bool,
+) -> list[LateralProfile]:
+    keep = LateralProfile(None, reference.position[:, 1], reference.velocity[:, 1], 0.0, 0.0)
+    profiles = [keep]
+    if not lateral or boxes.conflict is None:
+        return profiles
+    lower, upper, (k, j) = boxes.lower, boxes.upper, boxes.conflict
+    s = reference.position[:, 0]
+    room = 5.0 + 0.5 * max(float(start[1, 0]), 0.0)
+    beside = (lower[j, :, 0] - room < s) & (s < upper[j, :, 0] + room)
+    if not beside.any():
+        return profiles
+    right, left = bounds.at(s[beside])
+    targets = (
+        (Maneuver.LEFT, float(np.fmax.reduce(upper[j, beside, 1])) + margin),
+        (Maneuver.RIGHT, float(np.fmin.reduce(lower[j, beside, 1])) - margin),
+    )
+    rightmost, leftmost = float(right.max()) - 1e-6, float(left.min()) + 1e-6
+    available = float(tau[k])
+    moves = []
+    for maneuver, target in targets:
+        if not rightmost <= target <= leftmost:
+            continue
+        shift = abs(target - float(start[0, 1]))
+        # Peak acceleration of a quintic lane change is 10/sqrt(3) shift / T**2.
+        shortest = max(math.sqrt(5.8 * shift / (0.9 * limits.a_lat)), 1.9 * shift / limits.v_lat, 0.3)
+        longer = max(shortest, min(available, 4.0)), max(shortest, min(1.5 * available, 5.0))
+        moves += [(maneuver, target, duration) for duration in sorted({shortest, *longer})]
+    if not moves:
+        return profiles
+    kinds, ends, durations = zip(*moves, strict=True)
+    l, rate, acceleration = _quintics(start[:, 1], np.array(ends), np.array(durations), tau)  # noqa: E741
+    cost = np.add.reduce(acceleration**2, axis=1) / len(tau) + 0.1
+    return profiles + [
+        LateralProfile(*one) for one in zip(kinds, l, rate, acceleration, cost.tolist(), strict=True)
+    ]

@@ -1,0 +1,84 @@
+"""What the ego may do: the configured limits, or the vehicle's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.problem.settings import LimitsConfig
+from repair.vehicle.transitions import POSITION_TOLERANCE
+
+if TYPE_CHECKING:
+    from repair.vehicle.parameters import Vehicle
+
+__all__ = ["Limits", "resolve_limits"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the ego may do; every backend and the checker read the same numbers.
+
+    Attributes
+    ----------
+    v_max : float
+        Largest longitudinal speed [m/s]; the smallest is 0 (no reversing).
+    v_lat : float
+        Largest lateral speed in the Frenet frame [m/s].
+    a_min, a_max : float
+        Smallest (negative) and largest longitudinal acceleration [m/s²].
+    a_lat : float
+        Largest lateral acceleration [m/s²].
+    a_total : float
+        Radius of the friction circle [m/s²].
+    j_lon, j_lat : float
+        Largest magnitude of the longitudinal and lateral jerk [m/s³].
+    curvature : float
+        Largest curvature of the driven path [1/m], from the steering limit.
+    """
+
+    v_max: float
+    v_lat: float
+    a_min: float
+    a_max: float
+    a_lat: float
+    a_total: float
+    j_lon: float
+    j_lat: float
+    curvature: float
+
+
+# Share of the vehicle's friction circle that a repair may use where nothing else is configured:
+# the rest is left for what the kinematic model adds to the planned accelerations.
+_USABLE = 0.9
+
+
+def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: float) -> Limits:
+    """Limits with the vehicle's own numbers where the configuration leaves them open.
+
+    Parameters
+    ----------
+    speed : float
+        Initial speed [m/s]; beyond ``v_switch`` the engine limits acceleration (CommonRoad vehicle
+        models, eq. 2), and the limit is taken a little above this speed.
+    dt : float
+        Time step [s]. The drivability checker drives a transition with constant acceleration and
+        allows 2 cm of error; a jerk j moves the end by j dt**3 / 12.
+    """
+    usable = _USABLE * vehicle.a_max
+    engine = usable * min(1.0, vehicle.v_switch / max(speed + 3.0, 1e-3))
+    slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(0.95 * vehicle.steering_max))
+    drivable = 0.6 * POSITION_TOLERANCE * 12.0 / dt**3
+    a_total = usable if config.a_total is None else config.a_total
+    return Limits(
+        v_max=config.v_max if config.v_max is not None else vehicle.v_max,
+        v_lat=config.v_lat,
+        a_min=config.a_min if config.a_min is not None else -a_total,
+        a_max=config.a_max if config.a_max is not None else engine,
+        a_lat=config.a_lat if config.a_lat is not None else a_total,
+        a_total=a_total,
+        j_lon=min(config.j_lon, drivable),
+        j_lat=config.j_lat,
+        curvature=float(np.sin(slip) / vehicle.rear),
+    )

@@ -1,0 +1,76 @@
+"""The centre line along a chain of lanelets, lane changes included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.scene.road.lanes import Lane, locate
+
+__all__ = ["BEHIND", "centre_line", "cut_line", "direction_at"]
+BEHIND = 45.0  # centre line behind the ego [m]
+_FAR = 450.0  # centre line ahead of the ego at most [m]
+
+
+def direction_at(line: Array, end: int, sign: float) -> float:
+    end = len(line) - 1 if end < 0 else end
+    for start in range(end - 1, -1, -1):
+        step = sign * (line[end] - line[start])
+        if np.hypot(*step) > 1e-3:
+            return float(np.arctan2(step[1], step[0]))
+    return 0.0
+
+
+# ---------------------------------------------------------------------- centre line
+
+
+def _append(line: list[Array], points: Array) -> None:
+    """Join polylines; points that would go backwards over a short overlap are left out."""
+    for point in points:
+        if line:
+            step = point - line[-1]
+            if np.hypot(*step) < 1e-3:
+                continue
+            if len(line) > 1 and np.hypot(*step) < 3.0 and np.dot(step, line[-1] - line[-2]) < 0.0:
+                continue
+        line.append(point)
+
+
+def _changed(here: Array, there: Array, distance: float) -> Array:
+    """A line that runs from the start of ``here`` over to ``there`` within ``distance``, then along it."""
+    chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(here, axis=0).T))])
+    distance = min(distance, float(chord[-1]))
+    arc = np.linspace(0.0, distance, max(int(distance), 4) + 1)
+    own = np.stack([np.interp(arc, chord, here[:, 0]), np.interp(arc, chord, here[:, 1])], axis=1)
+    where = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(there, axis=0).T))])
+    found = np.array([locate(there, p)[0] for p in own])
+    other = np.stack([np.interp(found, where, there[:, 0]), np.interp(found, where, there[:, 1])], axis=1)
+    u = (arc / max(distance, 1e-9))[:, None]
+    blend = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    return np.concatenate([own + blend * (other - own), there[where > found[-1] + 1.0]])
+
+
+def centre_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float) -> Array:
+    line: list[Array] = []
+    k = 0
+    while k < len(chain):
+        last = k
+        while last + 1 < len(chain) and chain[last + 1] not in lanes[chain[last]].successors:
+            last += 1
+        here = lanes[chain[k]].center
+        _append(line, here if last == k else _changed(here, lanes[chain[last]].center, change * (last - k)))
+        k = last + 1
+    return np.array(line)
+
+
+def cut_line(line: Array, position: Array) -> tuple[Array, bool]:
+    """The part of a centre line around the ego, and whether its far end was cut off."""
+    chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    here = locate(line, position)[0]
+    low, high = max(here - 2.0 * BEHIND, 0.0), min(here + _FAR, float(chord[-1]))
+    inside = (chord > low) & (chord < high)
+    arc = np.concatenate([[low], chord[inside], [high]])
+    part = np.stack([np.interp(arc, chord, line[:, 0]), np.interp(arc, chord, line[:, 1])], axis=1)
+    return part, high < chord[-1]

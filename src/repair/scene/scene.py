@@ -1,0 +1,118 @@
+"""A planning problem made ready for the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.arrays import Array
+from repair.scene.frame import FrenetFrame
+from repair.scene.road.bounds import LateralBounds
+from repair.scene.traffic.obstacle import Obstacle
+from repair.vehicle.parameters import Vehicle
+
+__all__ = ["InitialState", "Scene", "SpeedLimit"]
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """The planning problem's initial state: [m], [rad], [m/s], [m/s²], [rad/s]."""
+
+    x: float
+    y: float
+    orientation: float
+    velocity: float
+    acceleration: float
+    yaw_rate: float
+
+
+@dataclass(frozen=True)
+class SpeedLimit:
+    """Speed limit by traffic signs, tabulated over s; inf where there is none [m/s]."""
+
+    s: Array
+    speed: Array
+
+    def at(self, s: npt.ArrayLike) -> Array:
+        """Limit at ``s`` (any shape): that of the last table entry at or before ``s``."""
+        query = np.asarray(s, dtype=np.float64)
+        index = np.clip(np.searchsorted(self.s, query, side="right") - 1, 0, len(self.s) - 1)
+        return np.asarray(self.speed[index])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A planning problem made ready: frame along the driven path, ego, road and obstacles.
+
+    Attributes
+    ----------
+    id : str
+        Benchmark id written in the file.
+    path : Path or None
+        The file; None for a scenario from memory.
+    sha256 : str
+        Of the file's bytes; empty for a scenario from memory.
+    dt : float
+        Time step [s].
+    frame : FrenetFrame
+        Along the path the ego drives: from its pose onto the route's centre line.
+    vehicle : Vehicle
+    start : (3, 2) array
+        Position, velocity and acceleration ``[s, l]`` at t = 0; l = 0 by construction.
+    initial_state : InitialState
+    planning_problem_id, initial_time_step : int
+    goal_s : float or None
+        Arc length at which the goal region begins [m]; None without a goal position on the route.
+    route_end_s : float
+        Arc length at which the road ends [m]; beyond, the frame is only a straight extension.
+    route_lanelets : tuple of int
+    horizon : float
+        Last time considered [s]; ``n_steps * dt``.
+    n_steps : int
+    obstacles : tuple of Obstacle
+        Without the recorded ego; every array has ``n_steps + 1`` rows.
+    recorded_ego : Obstacle or None
+        A trajectory obstacle that is the ego itself.
+    lane, same_direction, road : LateralBounds
+        Room of the reference point, half the ego's width taken off: on the route's lanelets, on
+        connected lanelets of the same direction, on all connected lanelets.
+    speed_limit : SpeedLimit or None
+    notes : tuple of str
+        What had to be assumed or left out.
+    scenario, planning_problem
+        The CommonRoad objects.
+    """
+
+    id: str
+    path: Path | None
+    sha256: str
+    dt: float
+    frame: FrenetFrame
+    vehicle: Vehicle
+    start: Array
+    initial_state: InitialState
+    planning_problem_id: int
+    initial_time_step: int
+    goal_s: float | None
+    route_end_s: float
+    route_lanelets: tuple[int, ...]
+    horizon: float
+    n_steps: int
+    obstacles: tuple[Obstacle, ...]
+    recorded_ego: Obstacle | None
+    lane: LateralBounds
+    same_direction: LateralBounds
+    road: LateralBounds
+    speed_limit: SpeedLimit | None
+    notes: tuple[str, ...]
+    scenario: Any
+    planning_problem: Any
+
+    @property
+    def times(self) -> Array:
+        """Times of the steps (n_steps + 1,) [s]."""
+        return np.arange(self.n_steps + 1, dtype=np.float64) * self.dt

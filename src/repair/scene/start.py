@@ -1,0 +1,69 @@
+"""The planning problem's initial state, and who of the traffic is the ego itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from repair.errors import ScenarioError
+from repair.scene.scene import InitialState
+from repair.scene.traffic.shapes import FAR
+from repair.vehicle.parameters import Vehicle
+
+__all__ = ["SPEED_RANGE", "first_step_of", "initial_state_of", "is_ego"]
+_STEPS_MAX = 10**9  # of the initial time step
+SPEED_RANGE = (-0.1, 100.0)  # initial speeds that can be dealt with [m/s]
+
+
+def initial_state_of(state: Any) -> InitialState:
+    values = []
+    position = getattr(state, "position", None)
+    if position is None or hasattr(position, "center") or hasattr(position, "shapes"):
+        raise ScenarioError("the planning problem's initial position is not an exact point")
+    for name in ("orientation", "velocity", "acceleration", "yaw_rate"):
+        value = getattr(state, name, None)
+        if value is not None and hasattr(value, "start"):
+            value = (value.start + value.end) / 2.0
+        if value is None and name in ("orientation", "velocity"):
+            raise ScenarioError(f"the planning problem's initial state has no {name}")
+        values.append(0.0 if value is None else float(value))
+    numbers = [float(position[0]), float(position[1]), *values]
+    if not np.isfinite(numbers).all():
+        raise ScenarioError("the planning problem's initial state is not finite")
+    made = InitialState(*numbers)
+    if max(abs(made.x), abs(made.y)) > FAR:
+        raise ScenarioError(
+            f"the ego's initial position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out"
+        )
+    if not SPEED_RANGE[0] <= made.velocity <= SPEED_RANGE[1]:
+        raise ScenarioError(
+            f"the ego's initial speed is {made.velocity:g} m/s; it has to be from 0 to {SPEED_RANGE[1]:g} m/s"
+        )
+    return made
+
+
+def first_step_of(state: Any) -> int:
+    step = getattr(state, "time_step", None)
+    if step is None:
+        raise ScenarioError("the planning problem's initial state has no time step")
+    first = int(step.start if hasattr(step, "start") else step)
+    if not 0 <= first <= _STEPS_MAX:
+        raise ScenarioError(f"the planning problem starts at time step {first}; CommonRoad counts from 0")
+    return first
+
+
+def is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehicle) -> bool:
+    """Whether a moving obstacle starts where, how fast and about as large as the ego."""
+    state = obstacle.state_at_time(first_step)
+    if state is None or hasattr(state.position, "center") or hasattr(state.position, "shapes"):
+        return False
+    heading, speed = getattr(state, "orientation", None), getattr(state, "velocity", None)
+    if hasattr(heading, "start") or hasattr(speed, "start"):  # uncertain
+        return False
+    off = np.hypot(state.position[0] - ego.x, state.position[1] - ego.y)
+    turned = 0.0 if heading is None else abs((heading - ego.orientation + np.pi) % (2 * np.pi) - np.pi)
+    faster = 0.0 if speed is None else abs(speed - ego.velocity)
+    length = getattr(obstacle.obstacle_shape, "length", None)
+    alike = length is None or abs(length - vehicle.length) < 2.0
+    return bool(off < 0.5 and turned < 0.1 and faster < 1.0 and alike)

@@ -1,0 +1,165 @@
+"""Obstacles of a CommonRoad scenario as plain arrays, one row per time step.
+
+What CommonRoad leaves open is settled here, towards the larger occupancy:
+
+- a shape turns about its own centre, which is then moved by the state (commonroad-io's reading);
+- an uncertain position or orientation takes the rectangle that encloses every placement;
+- a missing orientation is the direction of motion;
+- a dynamic obstacle without a prediction stands where it is (noted);
+- a set-based occupancy over [k, k + 1] counts at k and at k + 1;
+- after its prediction an obstacle is gone (CommonRoad's own reading), or held, or moves on.
+
+A prediction with a hole, or with steps out of order, is refused: commonroad-io and the drivability
+checker count its states instead of reading their time steps, and would put the obstacle elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from repair.errors import ConfigError, ScenarioError
+from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.rows import obstacle_of_rows, require_sane
+from repair.scene.traffic.shapes import (
+    Placed,
+    occupied,
+)
+from repair.scene.traffic.timeline import continued, headings_of, state_occupancy, steps_of, timeline
+
+__all__ = ["AFTER_PREDICTION", "last_predicted_step", "obstacles_of"]
+
+AFTER_PREDICTION = ("remove", "hold", "constant_velocity")
+
+
+def _all(scenario: Any) -> list[Any]:
+    return [
+        *scenario.static_obstacles, *scenario.dynamic_obstacles,
+        *getattr(scenario, "phantom_obstacle", ()), *getattr(scenario, "environment_obstacle", ()),
+    ]  # fmt: skip
+
+
+def last_predicted_step(scenario: Any) -> int | None:
+    """Last time step at which any moving obstacle is predicted; None where nothing moves."""
+    last = []
+    for obstacle in _all(scenario):
+        prediction = getattr(obstacle, "prediction", None)
+        trajectory = getattr(prediction, "trajectory", None)
+        if trajectory is not None:
+            last.append(max(steps_of(s.time_step)[1] for s in trajectory.state_list))
+        elif prediction is not None:
+            last.extend(steps_of(o.time_step)[1] for o in prediction.occupancy_set)
+    return max(last, default=None)
+
+
+def obstacles_of(
+    scenario: Any,
+    *,
+    first_step: int,
+    n_steps: int,
+    after_prediction: str = "remove",
+    is_ego: Callable[[Any], bool] = lambda obstacle: False,
+    ego_id: int | None = None,
+    ego_speed: float = np.nan,
+) -> tuple[tuple[Obstacle, ...], Obstacle | None, list[str]]:
+    """Read every obstacle of a scenario.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+    first_step : int
+        The planning problem's initial time step, k = 0 here; earlier steps are cut.
+    n_steps : int
+        Rows are k = 0 .. n_steps.
+    after_prediction : str
+        What becomes of an obstacle after its prediction: ``remove``, ``hold`` or ``constant_velocity``.
+    is_ego : callable
+        Recognises the ego's own recording among the dynamic obstacles by its start.
+    ego_id, ego_speed
+        The planning problem's id and initial speed [m/s]: a trajectory obstacle with that id (ids
+        are unique in CommonRoad) and speed is the ego's recording from a later start, and left out.
+
+    Returns
+    -------
+    obstacles, recorded ego (or None), notes
+
+    Raises
+    ------
+    ConfigError
+        If ``after_prediction`` is none of the three.
+    ScenarioError
+        If an obstacle has a number that is not finite; the sentence names it.
+    """
+    if after_prediction not in AFTER_PREDICTION:
+        raise ConfigError(
+            f"after_prediction is {after_prediction!r}; it can be {', '.join(AFTER_PREDICTION)}"
+        )
+    found: list[Obstacle] = []
+    ego: Obstacle | None = None
+    notes: list[str] = []
+    for obstacle in _all(scenario):
+        name = int(obstacle.obstacle_id)
+        try:
+            placed, role = _placed(obstacle, first_step, first_step + n_steps)
+        except ScenarioError as error:
+            raise ScenarioError(f"obstacle {name}: {error}") from error
+        kind = str(getattr(getattr(obstacle, "obstacle_type", None), "value", "unknown"))
+        if isinstance(placed, Placed):
+            if role == "dynamic":
+                notes.append(f"obstacle {name} has no prediction and is taken to stand still")
+            found.append(obstacle_of_rows(name, kind, role, [placed], n_steps + 1))
+            continue
+        rows = [placed.get(first_step + k) for k in range(n_steps + 1)]
+        rows = continued(rows, placed, first_step, after_prediction, float(scenario.dt))
+        if not any(row is not None for row in rows):
+            notes.append(f"obstacle {name} is never there within the horizon")
+            continue
+        made = obstacle_of_rows(name, kind, role, rows)
+        if role == "dynamic" and ego is None and is_ego(obstacle):
+            ego = made
+            notes.append(f"obstacle {name} is the ego's own recording and is left out")
+        elif (
+            role == "dynamic"
+            and name == ego_id
+            and abs(np.nan_to_num(made.states[0, 3], nan=1e9) - ego_speed) < 1.0
+        ):
+            notes.append(
+                f"obstacle {name} has the planning problem's id and the ego's speed: a copy, left out"
+            )
+        else:
+            found.append(made)
+    return tuple(found), ego, notes
+
+
+def _placed(obstacle: Any, first: int, last: int) -> tuple[Placed | dict[int, Placed], str]:
+    """Where an obstacle is, for good or by time step, and its role.
+
+    Raises
+    ------
+    ScenarioError
+        Without the obstacle's name.
+    """
+    still = _standing(obstacle)
+    if still is not None:
+        require_sane([still[1]])
+        return still[1], still[0]
+    steps, role = timeline(obstacle, first, last)
+    require_sane(steps.values())
+    return steps, role
+
+
+def _standing(obstacle: Any) -> tuple[str, Placed] | None:
+    """Role and place of an obstacle that never moves; None for the others."""
+    role = str(getattr(obstacle.obstacle_role, "value", obstacle.obstacle_role))
+    if getattr(obstacle, "initial_state", None) is None:
+        shape = getattr(obstacle, "obstacle_shape", None)
+        return None if shape is None else ("environment", occupied(shape))
+    if role != "static" and getattr(obstacle, "prediction", None) is not None:
+        return None
+    state = obstacle.initial_state
+    placed = state_occupancy(obstacle.obstacle_shape, state, headings_of([state])[0])
+    if role == "static":
+        placed = placed._replace(state=(*placed.state[:3], 0.0))
+    return ("static" if role == "static" else "dynamic"), placed

@@ -1,0 +1,97 @@
+"""Placed occupancies as the arrays of an obstacle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from repair.arrays import Array, frozen
+from repair.errors import ScenarioError
+from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.shapes import (
+    FAR,
+    Placed,
+    polygons_of,
+    subdivided,
+)
+
+__all__ = ["obstacle_of_rows", "repeated", "require_sane"]
+_LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
+
+
+def _rigid_outline(rectangles: Array) -> Array | None:
+    """Outlines of one rectangle on its way, all at once; None where its size changes."""
+    half = rectangles[np.isfinite(rectangles[:, 0]), 3:]
+    if np.ptp(half, axis=0).any():
+        return None
+    local = subdivided(np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half[0])
+    c, s = np.cos(rectangles[:, 2, None]), np.sin(rectangles[:, 2, None])
+    x = c * local[:, 0] - s * local[:, 1] + rectangles[:, 0, None]
+    y = s * local[:, 0] + c * local[:, 1] + rectangles[:, 1, None]
+    return np.stack([x, y], axis=-1)
+
+
+def _outline_rows(rows: Sequence[Placed | None]) -> Array:
+    """Outlines of whatever shape, padded with their last point to the same length."""
+    shells = [np.concatenate([subdivided(p) for p in polygons_of(row)]) if row else None for row in rows]
+    vertices = np.full((len(rows), max(len(o) for o in shells if o is not None), 2), np.nan)
+    for k, outline in enumerate(shells):
+        if outline is not None:
+            vertices[k, : len(outline)] = outline
+            vertices[k, len(outline) :] = outline[-1]
+    return vertices
+
+
+def obstacle_of_rows(
+    name: int, kind: str, role: str, rows: Sequence[Placed | None], static_rows: int = 0
+) -> Obstacle:
+    """Stack rows into an obstacle; a single row is repeated ``static_rows`` times without copying."""
+    present = [row for row in rows if row is not None]
+    rectangles = circles = None
+    polygons: tuple[tuple[Array, ...], ...] = ()
+    if all(row.rectangle for row in present):
+        rectangles = np.array([row.rectangle if row else (np.nan,) * 5 for row in rows], dtype=np.float64)
+    elif all(row.circle for row in present):
+        circles = np.array([row.circle if row else (np.nan,) * 3 for row in rows], dtype=np.float64)
+    else:
+        polygons = tuple(tuple(frozen(p) for p in polygons_of(row)) if row else () for row in rows)
+    vertices = _rigid_outline(rectangles) if rectangles is not None else None
+    if vertices is None:
+        vertices = _outline_rows(rows)
+    states = np.array([row.state if row else (np.nan,) * 4 for row in rows], dtype=np.float64)
+    made = Obstacle(
+        name, kind, role, frozen(vertices), None if rectangles is None else frozen(rectangles),
+        None if circles is None else frozen(circles), polygons, frozen(states),
+    )  # fmt: skip
+    return repeated(made, static_rows) if static_rows else made
+
+
+def repeated(obstacle: Obstacle, count: int) -> Obstacle:
+    def wide(array: Array) -> Array:
+        return np.broadcast_to(array[0], (count, *array.shape[1:]))
+
+    return replace(
+        obstacle,
+        vertices=wide(obstacle.vertices),
+        rectangles=None if obstacle.rectangles is None else wide(obstacle.rectangles),
+        circles=None if obstacle.circles is None else wide(obstacle.circles),
+        polygons=obstacle.polygons * count,
+        states=wide(obstacle.states),
+    )
+
+
+def require_sane(placed: Iterable[Placed]) -> None:
+    for item in placed:
+        places = [np.asarray(item.state[:2]), *(item.polygons or ())]
+        places += [np.asarray(shape[:2]) for shape in (item.rectangle, item.circle) if shape]
+        sizes = [*(item.rectangle or ())[3:], *(item.circle or ())[2:]]
+        sizes += [float(np.max(np.ptp(p, axis=0))) / 2.0 for p in item.polygons or ()]
+        angle = item.rectangle[2] if item.rectangle else 0.0
+        if not (np.isfinite([*sizes, angle]).all() and all(np.isfinite(p).all() for p in places)):
+            raise ScenarioError("a state or shape of it is not finite")
+        if not 0.0 < min(sizes) <= max(sizes) <= _LARGEST:
+            raise ScenarioError(f"its size is {2.0 * min(sizes):g} to {2.0 * max(sizes):g} m")
+        if max(float(np.max(np.abs(p))) for p in places) > FAR:
+            raise ScenarioError(f"it is farther than {FAR:g} m out")

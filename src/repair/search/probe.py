@@ -1,0 +1,118 @@
+"""One time-to-repair: every open side solved and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from repair.backend.base import RepairBackend, SolveResult, SolveStatus
+from repair.check.verdict import Reason, Verdict, Violation
+from repair.curves.base import Curve
+from repair.problem.problem import RepairProblem
+from repair.search.result import Probe
+
+__all__ = ["Budget", "OutOfTime", "ProblemSource", "TrajectoryChecker", "probe_sides", "relaxed"]
+
+
+class ProblemSource(Protocol):
+    """Makes the repair problems of a t_rep, one for each open side of passing."""
+
+    def at(self, t_rep: float) -> Sequence[RepairProblem]:
+        """Problems in the order in which they should be tried; empty where no way is open."""
+        ...
+
+
+class TrajectoryChecker(Protocol):
+    """Judges a repaired curve; the same for every backend."""
+
+    def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
+        """Verdict on the reference until t_rep followed by ``curve``."""
+        ...
+
+
+class OutOfTime(Exception):
+    """Ours alone: a TimeoutError may come out of a backend, and would be its bug."""
+
+
+@dataclass
+class Budget:
+    limit: float | None
+    begin: float
+    clock: Callable[[], float]
+    cut: bool = False  # the last probe would have gone on, had there been time
+
+    @property
+    def left(self) -> float | None:
+        return None if self.limit is None else max(self.limit - (self.clock() - self.begin), 0.0)
+
+    @property
+    def spent(self) -> bool:
+        return self.left == 0.0
+
+
+def probe_sides(
+    t_rep: float,
+    problems: Sequence[RepairProblem],
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    warm_start: Curve | None,
+    budget: Budget,
+) -> Probe:
+    """Solve and check every open side; keep the feasible one of least cost, else the first failure."""
+    best: Probe | None = None
+    tried: list[str] = []
+    for problem in problems:
+        if tried and budget.spent:
+            budget.cut = True
+            break
+        solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+        budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
+        begin = budget.clock()
+        verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
+        margin = problem.margin
+        closest = solve.stages.get("closest") if getattr(backend, "relaxes", False) else None
+        if solve.curve is None and closest is not None and not problem.strict:
+            # The backend calls this infeasible, and so it stays; but boxes are wider than vehicles, and
+            # the checker may accept the curve that comes closest.
+            again = checker.check(problem, closest)
+            if again.ok:
+                margin -= solve.residuals["obstacles"]
+                detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
+                solve, verdict = replace(solve, curve=closest, detail=detail), again
+        maneuver = problem.passing.maneuver if problem.passing is not None else None
+        name = maneuver.value if maneuver is not None else "follow"
+        tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
+        probe = Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
+        if best is None or _better(probe, best):
+            best = probe
+        if sides == "first" and probe.feasible:
+            break
+    if best is None:
+        nothing = SolveResult(SolveStatus.INFEASIBLE, detail="no manoeuvre past the obstacles is open")
+        why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
+        return Probe(t_rep, nothing, Verdict((why,)))
+    return Probe(t_rep, best.solve, best.verdict, best.maneuver, best.check_time, tuple(tried), best.margin)
+
+
+def _better(new: Probe, old: Probe) -> bool:
+    if new.feasible != old.feasible:
+        return new.feasible
+    return new.feasible and new.solve.objective < old.solve.objective
+
+
+def _unsolved(solve: SolveResult, t_rep: float) -> Verdict:
+    reason = Reason.NO_CORRIDOR if solve.status is SolveStatus.NO_CORRIDOR else Reason.NOT_SOLVED
+    return Verdict((Violation(reason, t_rep, solve.detail or solve.status.sentence),))
+
+
+def relaxed(source: ProblemSource, backend: RepairBackend, t_rep: float) -> Iterator[Sequence[RepairProblem]]:
+    """Problems with smaller margins, for a backend that keeps its margin whatever it costs.
+
+    Boxes in (s, l) are wider than the vehicles in them; a hard backend would call a repair infeasible
+    that the checker, which looks at the true rectangles, accepts.
+    """
+    relaxed = getattr(source, "relaxed", None)
+    if relaxed is not None and getattr(backend, "relaxes", False):
+        yield from relaxed(t_rep)

@@ -1,0 +1,91 @@
+"""Visited times-to-repair, and the answer of Algorithm 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+from repair.backend.base import SolveResult
+from repair.check.verdict import Conflict, Verdict
+from repair.curves.base import Curve
+from repair.problem.problem import Maneuver
+
+__all__ = ["Probe", "SearchResult", "SearchStatus"]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said."""
+
+    t_rep: float
+    solve: SolveResult
+    verdict: Verdict
+    maneuver: Maneuver | None = None
+    check_time: float = 0.0
+    tried: tuple[str, ...] = ()
+    margin: float | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the repaired trajectory passed every check."""
+        return self.solve.curve is not None and self.verdict.ok
+
+
+class SearchStatus(str, Enum):
+    """How a search ended."""
+
+    FOUND = "found"
+    NO_CONFLICT = "no_conflict"
+    ALREADY_COLLIDING = "already_colliding"
+    NONE_FEASIBLE = "none_feasible"
+    BUDGET_EXHAUSTED = "budget_exhausted"
+
+    @property
+    def sentence(self) -> str:
+        """What the status means, in a sentence."""
+        return {
+            "found": "a repaired trajectory passed every check",
+            "no_conflict": "the reference can be followed to its end",
+            "already_colliding": "the ego is in conflict at the very start",
+            "none_feasible": "no tested time-to-repair has a feasible repair",
+            "budget_exhausted": "the time limit ended the search before any feasible repair was found",
+        }[self.value]
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The answer of Algorithm 1.
+
+    Attributes
+    ----------
+    status : SearchStatus
+    conflict : Conflict
+    f_ttr : float or None
+        Last verified t_rep [s]; inf without a conflict; None where nothing was verified.
+    curve : Curve or None
+        The repaired part from ``f_ttr`` on; None without a repair.
+    probes : tuple of Probe
+        In the order of visiting.
+    complete : bool
+        Whether the rule ran to its end (False: interrupted or out of time).
+    wall_time : float
+        Wall time of the search [s].
+    """
+
+    status: SearchStatus
+    conflict: Conflict
+    f_ttr: float | None
+    curve: Curve | None
+    probes: tuple[Probe, ...] = ()
+    complete: bool = True
+    wall_time: float = 0.0
+
+    @property
+    def best(self) -> Probe | None:
+        """The probe behind ``f_ttr``."""
+        feasible = [p for p in self.probes if p.feasible]
+        return max(feasible, key=lambda p: p.t_rep) if feasible else None
+
+    def __iter__(self) -> Iterator[Probe]:
+        return iter(self.probes)

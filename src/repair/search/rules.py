@@ -1,0 +1,103 @@
+"""Which times-to-repair are visited, and in which order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+
+__all__ = ["Order", "probe_order"]
+
+#: Yields the next t_rep [s], is sent whether it was feasible.
+Order = Generator[float, bool, None]
+#: Whether a way past the obstacles seems to be open at a t_rep [s].
+IsOpen = Callable[[float], bool]
+
+
+def _grid_size(end: float, delta_t: float) -> int:
+    """Number of grid points k * delta_t in [0, end)."""
+    return max(0, math.ceil(end / delta_t - 1e-9))
+
+
+def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
+    feasible, infeasible = -1, _grid_size(end, delta_t)
+    if infeasible == 0:
+        return
+    if (yield 0.0):
+        feasible = 0
+    else:
+        return
+    while infeasible - feasible > 1:
+        middle = (feasible + infeasible) // 2
+        if (yield middle * delta_t):
+            feasible = middle
+        else:
+            infeasible = middle
+
+
+def _guided(end: float, delta_t: float, is_open: IsOpen) -> Order:
+    size = _grid_size(end, delta_t)
+    feasible, infeasible = -1, size
+    k, stride = _last_open(size, delta_t, is_open), 1
+    while infeasible - feasible > 1:
+        k = min(max(k, feasible + 1), infeasible - 1)
+        if (yield k * delta_t):
+            feasible = k
+        else:
+            infeasible = k
+        if feasible >= 0 and infeasible < size:
+            k = (feasible + infeasible) // 2
+        else:  # on in the same direction, twice as far each time, until there is an answer of each kind
+            k += stride if feasible == k else -stride
+            stride *= 2
+
+
+def _last_open(size: int, delta_t: float, is_open: IsOpen) -> int:
+    """Where on the grid the ways past the obstacles seem to shut, by bisection: the last open point, or 0."""
+    found, shut = 0, size
+    while shut - found > 1:
+        middle = (found + shut) // 2
+        if is_open(middle * delta_t):
+            found = middle
+        else:
+            shut = middle
+    return found
+
+
+def _scan(end: float, delta_t: float, is_open: IsOpen) -> Order:
+    for k in range(_grid_size(end, delta_t)):
+        yield k * delta_t
+
+
+def _as_printed(end: float, delta_t: float, is_open: IsOpen) -> Order:
+    start, t_rep = 0.0, 0.0
+    while abs(end - start) > delta_t + 1e-12:
+        if (yield t_rep):
+            start = t_rep
+        else:
+            end = t_rep
+        t_rep = 0.5 * (start + end)
+
+
+_RULES: dict[str, Callable[[float, float, IsOpen], Order]] = {
+    "guided": _guided,
+    "bisect": _bisect,
+    "scan": _scan,
+    "as_printed": _as_printed,
+}
+
+
+def probe_order(rule: str, end: float, delta_t: float, is_open: IsOpen = lambda t_rep: True) -> Order:
+    """The times-to-repair that a rule visits below ``end`` [s].
+
+    Parameters
+    ----------
+    rule : str
+        ``guided``: from the last grid point at which a way past the obstacles is open on, to where
+        feasible and infeasible meet; ``bisect``: t_rep = 0, then bisection on the grid; both assume
+        that feasibility is contiguous. ``scan``: every grid point, which assumes nothing;
+        ``as_printed``: Algorithm 1 to the letter.
+    is_open : callable
+        Whether a way past the obstacles is open at a t_rep [s]: a guess at feasibility that costs
+        little. Only ``guided`` asks, and a wrong answer costs it probes, nothing else.
+    """
+    return _RULES[rule](end, delta_t, is_open)

@@ -1,0 +1,136 @@
+"""Algorithm 1: the Feasible Time-To-React by search over t_rep, for any backend.
+
+The search runs on integer multiples of Delta T (1.6 - 1.2 > 0.4 in floating point) and the F-TTR is
+the last *verified* t_rep. Algorithm 1 as printed returns a midpoint that was never tested and cannot
+produce the iterates that the paper reports; rule ``as_printed`` visits what it would visit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from repair.backend.base import RepairBackend
+from repair.check.verdict import Conflict
+from repair.curves.base import Curve
+from repair.problem.problem import RepairProblem
+from repair.search.probe import Budget, OutOfTime, ProblemSource, TrajectoryChecker, probe_sides, relaxed
+from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.rules import probe_order
+from repair.search.settings import SearchConfig
+
+__all__ = ["search_f_ttr"]
+
+
+def iter_probes(
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    end: float,
+    settings: SearchConfig,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Iterator[Probe]:
+    """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
+
+    Parameters
+    ----------
+    end : float
+        Upper end of the search [s], excluded: the reference is in conflict there.
+    """
+    budget = Budget(settings.time_limit, clock(), clock)
+    made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
+
+    def is_open(t_rep: float) -> bool:
+        if budget.spent:
+            return False
+        made[t_rep] = source.at(t_rep)
+        return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
+
+    order = probe_order(settings.rule, end, settings.delta_t, is_open)
+    warm_start: Curve | None = None
+    answer: bool | None = None
+    while True:
+        try:
+            t_rep = next(order) if answer is None else order.send(answer)
+        except StopIteration:
+            return
+        if budget.spent:
+            raise OutOfTime
+        budget.cut = False
+        first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
+        probe = probe_sides(t_rep, first, backend, checker, settings.sides, warm_start, budget)
+        for problems in relaxed(source, backend, t_rep):
+            if probe.feasible:
+                break
+            if budget.spent:
+                budget.cut = True
+                break
+            again = probe_sides(t_rep, problems, backend, checker, settings.sides, warm_start, budget)
+            tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
+            probe = replace(again if again.feasible else probe, tried=tried)
+        if probe.feasible:
+            warm_start = probe.solve.curve
+        answer = probe.feasible
+        yield probe
+        if budget.cut and not answer:
+            raise OutOfTime  # nobody knows whether it would have been feasible
+
+
+def search_f_ttr(
+    source: ProblemSource,
+    conflict: Conflict,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    settings: SearchConfig,
+    *,
+    on_probe: Callable[[Probe], None] | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> SearchResult:
+    """Algorithm 1 of the paper.
+
+    Parameters
+    ----------
+    source : ProblemSource
+    conflict : Conflict
+        Where the reference fails; its time is the TTC.
+    backend : RepairBackend
+    checker : TrajectoryChecker
+    settings : SearchConfig
+    on_probe : callable, optional
+        Called after every probe; an interrupt in between loses nothing that was found.
+    clock : callable
+        Monotonic time [s]; a parameter so that tests can bend it.
+
+    Returns
+    -------
+    SearchResult
+        ``f_ttr`` is the largest t_rep whose repair was verified.
+    """
+    begin = clock()
+    if conflict.time == float("inf"):
+        return SearchResult(SearchStatus.NO_CONFLICT, conflict, float("inf"), None)
+    if conflict.contact_time <= 0.0:
+        return SearchResult(SearchStatus.ALREADY_COLLIDING, conflict, None, None)
+    # A conflict at t = 0 without contact leaves t_rep = 0 as the only candidate.
+    end = max(conflict.time, settings.delta_t * 1e-3)
+    if settings.upper is not None:
+        end = min(end, max(settings.upper, settings.delta_t * 1e-3))
+    probes: list[Probe] = []
+    complete = True
+    try:
+        for probe in iter_probes(source, backend, checker, end, settings, clock):
+            probes.append(probe)
+            if on_probe is not None:
+                on_probe(probe)
+    except (OutOfTime, KeyboardInterrupt):
+        complete = False
+    feasible = [p for p in probes if p.feasible]
+    wall = clock() - begin
+    if feasible:
+        best = max(feasible, key=lambda p: p.t_rep)
+        return SearchResult(
+            SearchStatus.FOUND, conflict, best.t_rep, best.solve.curve, tuple(probes), complete, wall
+        )
+    status = SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED
+    return SearchResult(status, conflict, None, None, tuple(probes), complete, wall)

@@ -1,0 +1,317 @@
+"""The hard-constraint backend: the same uniform B-spline as an NLP, solved by IPOPT or SQP.
+
+What a curve that this backend calls solved keeps, recomputed from the solution with NumPy:
+
+* speed (0 to v_max), lateral speed, s'' and l'', s''' and l''', and the direction of travel
+  (|l'| <= tan(heading) s'): the Bernstein points of every piece are inside, so the curve is, at
+  *every* time from t_rep on;
+* obstacles, ``obstacles: hull``: for every window (at most one scenario step long) the Bernstein
+  points lie beyond the moving edge of the inflated box, so the curve is clear at *every* time until
+  t_end, the box moving linearly between scenario steps (:mod:`repair.solvers.casadi.separation`);
+  ``obstacles: sampled``: the curve is clear at the control points' Greville times, and only there;
+* the road's edges: as ``hull``, with the narrowest width over the s the curve covers in a window;
+* accelerations in the plane (friction circle, longitudinal and lateral limit), the curvature of the
+  driven path and the ends of the body against the road's edges, the axis' curvature included: at the
+  ends of all windows, and only there. The friction circle is used to 99.5 %, which has kept it at
+  every millisecond as well.
+
+Sides of passing are the guide's, window by window, unless those contradict the limits; then the curve
+that misses the obstacles by the least is asked for its sides. The axis' curvature and the road's width
+over s enter as lines around the last path; the NLP is solved again around its own solution, s within a
+trust region, until the exact values agree.
+
+The convex QP of all linear constraints is solved first, by daqp. Where it has no solution there is
+none; where, with s alone, its solution keeps the friction circle as well, ``sqpmethod`` would only
+confirm it and is not asked.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from repair.arrays import Array, frozen
+from repair.backend.base import SolveResult, SolveStatus
+from repair.config import Config
+from repair.curves.base import Curve
+from repair.curves.bases import n_points_for
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve, splice_points
+from repair.errors import BackendError
+from repair.problem.problem import RepairProblem
+from repair.solvers.casadi.guide import guide_of
+from repair.solvers.casadi.instance import ROAD_SLACK, TOLERANCE, Instance
+from repair.solvers.casadi.model import Model, build_model
+from repair.solvers.casadi.rows import Structure
+from repair.solvers.casadi.separation import Separation, separate
+from repair.solvers.casadi.settings import CasadiConfig
+from repair.solvers.casadi.words import gap_of, largest_violation, missed, status_of, worst_family
+
+__all__ = ["CasadiBackend", "make"]
+
+_TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
+_SIDES = 4  # sets of sides that are tried
+
+
+class CasadiBackend:
+    """Hard constraints through CasADi.
+
+    ``relaxes``: the search may ask again with a smaller margin, see ``repair.relax``.
+
+    Parameters
+    ----------
+    config : CasadiConfig
+    degree : int
+        Degree of the B-spline.
+    spacing : float
+        Knot spacing [s].
+    """
+
+    name = "casadi"
+    relaxes = True
+
+    def __init__(self, config: CasadiConfig | None = None, *, degree: int = 3, spacing: float = 0.2) -> None:
+        self.config = config or CasadiConfig()
+        self.degree = degree
+        self.spacing = spacing
+
+    def solve(
+        self, problem: RepairProblem, *, warm_start: Curve | None = None, time_limit: float | None = None
+    ) -> SolveResult:
+        """Solve one repair.
+
+        Raises
+        ------
+        repair.errors.BackendError
+            If the problem is malformed (no time left between t_rep and t_end, states not finite).
+        """
+        begin = time.perf_counter()
+        _require(problem)
+        deadline = None if time_limit is None else begin + time_limit
+        try:
+            model = build_model(self._structure(problem, timed=time_limit is not None))
+            instance, points = self._instance(problem, model)
+            built, before = time.perf_counter(), model.build_time
+            result = self._rounds(instance, points, warm_start, deadline, time_limit)
+        except (BackendError, ImportError) as error:
+            return SolveResult(
+                SolveStatus.UNAVAILABLE, build_time=time.perf_counter() - begin, detail=str(error)
+            )
+        late = model.build_time - before  # the NLP is made when it is first needed
+        spent = time.perf_counter() - built
+        return replace(result, build_time=built - begin + late, solve_time=spent - late)
+
+    def _structure(self, problem: RepairProblem, timed: bool) -> Structure:
+        c = self.config
+        return Structure(
+            n=n_points_for(problem.t_end - problem.t_rep, self.spacing, self.degree),
+            degree=self.degree,
+            spacing=self.spacing,
+            windows=max(1, int(np.ceil(self.spacing / problem.dt - 1e-9))),
+            lateral=problem.lateral,
+            sampled=c.obstacles == "sampled",
+            weights=(c.w_acceleration, c.w_jerk, c.w_reference),
+            solver=c.solver,
+            max_iterations=c.max_iterations,
+            tolerance=c.tolerance,
+            tangent=float(np.tan(c.heading)),
+            overhang=c.overhang,
+            timed=timed,
+        )
+
+    # -- layout ----------------------------------------------------------------------------------
+
+    def _instance(self, problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
+        """Lay out the problem, and the initial control points (n, 2)."""
+        n, p, h = model.structure.n, self.degree, self.spacing
+        origin = np.array([problem.start[0, 0], 0.0])
+        derivatives = np.zeros((p, 2))
+        derivatives[:3] = problem.start
+        if p > 3:
+            derivatives[3] = problem.reference.sample([problem.t_rep]).jerk[0]
+        head = splice_points(derivatives, p, h) - origin
+        points = fit_to_curve(guide_of(problem), problem.t_rep, n, p, h).points - origin
+        points[:p] = head
+        if not problem.lateral and problem.passing is not None:
+            points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
+        return Instance(problem, model, origin, head), points
+
+    # -- rounds ----------------------------------------------------------------------------------
+
+    def _rounds(
+        self,
+        instance: Instance,
+        points: Array,
+        warm_start: Curve | None,
+        deadline: float | None,
+        time_limit: float | None,
+    ) -> SolveResult:
+        """Solve around the guide, then around the solution, until the exact constraints are kept."""
+        problem, model = instance.problem, instance.model
+        why = instance.start_violation()
+        if why:
+            return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+        separation, points, why, closest = self._open(instance, points)
+        if why:
+            return self._infeasible(instance, why, closest)
+        residuals = instance.residuals(separation, points)
+        if _answered(instance, points, residuals):
+            word = "the optimum of the linear rows keeps the others too"
+            found, cost = self._curve(instance, points), instance.objective(points)
+            return SolveResult(SolveStatus.SOLVED, found, cost, detail=word, residuals=residuals)
+        points = self._warmer(instance, separation, points, residuals, warm_start)
+        iterations = 0
+        for round_ in range(self.config.rounds):
+            trust = _TRUST * 0.5**round_ if round_ else None
+            low, high = instance.bounds(separation, points, trust)
+            points, status, word, count = self._run(instance, points, low, high, deadline)
+            iterations += count
+            residuals = instance.residuals(separation, points)
+            kept = largest_violation(residuals) <= TOLERANCE
+            if status is not SolveStatus.SOLVED or kept:
+                break
+            if deadline is not None and time.perf_counter() > deadline:
+                status = SolveStatus.TIME_LIMIT
+                break
+            shape = instance.shape(points)
+            room = instance.room(shape, min(ROAD_SLACK, 0.5 * trust) if trust else ROAD_SLACK)
+            separation = separate(
+                problem, instance.windows, len(model.obstacle), shape, room, separation.side, instance.boxes
+            )
+        detail = word
+        if status is SolveStatus.SOLVED and not kept:
+            status = SolveStatus.NUMERICAL_ERROR
+            detail = f"{worst_family(residuals)} after {self.config.rounds} rounds"
+        elif status is SolveStatus.TIME_LIMIT and time_limit is not None:
+            detail = f"time limit of {time_limit:g} s"
+        elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
+            detail = f"{word}; at the last iterate {worst_family(residuals)}"
+        usable = kept and status is not SolveStatus.INFEASIBLE
+        curve = self._curve(instance, points) if usable else None
+        objective = instance.objective(points)
+        return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
+
+    def _curve(self, instance: Instance, points: Array) -> UniformBSpline:
+        t_rep = instance.problem.t_rep
+        return UniformBSpline(t_rep, self.spacing, self.degree, frozen(points + instance.origin))
+
+    def _infeasible(
+        self, instance: Instance, why: str, closest: tuple[Array, dict[str, float]] | None
+    ) -> SolveResult:
+        """No solution; with the curve, if any, that keeps all other linear rows and comes closest."""
+        if closest is None:
+            return SolveResult(SolveStatus.INFEASIBLE, detail=why)
+        curve = self._curve(instance, closest[0])
+        return SolveResult(
+            SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve}
+        )
+
+    def _open(
+        self, instance: Instance, points: Array
+    ) -> tuple[Separation, Array, str, tuple[Array, dict[str, float]] | None]:
+        """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
+
+        The last item is the curve that misses the obstacles by the least, and what it violates.
+
+        The guide's sides come first. Where they contradict the limits, the curve that misses the
+        obstacles by the least is asked for its sides instead, and so on.
+        """
+        model, problem, windows = instance.model, instance.problem, instance.windows
+        slope = instance.slope
+        moment = windows.moment
+        shape = guide_of(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
+        if not problem.lateral:
+            shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
+        room = instance.room(shape)
+        why, before = "", None
+        closest: tuple[Array, dict[str, float]] | None = None
+        for _ in range(_SIDES):
+            separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
+            if separation.why:
+                return separation, points, separation.why, closest
+            side = separation.side
+            if before is not None and side is not None and np.array_equal(side, before):
+                break
+            before = side
+            gap = gap_of(separation)
+            why = why or gap
+            low, high = instance.bounds(separation, None)
+            x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
+            if x is not None:
+                points = instance.relaxed = model.with_unknowns(points, x)
+            if possible:
+                return separation, points, "", closest
+            modest = instance.bounds(separation, None, modest=True)
+            elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
+            if elastic is None:
+                why = why or "no curve from the start state keeps the limits and the road"
+                return separation, points, why, closest
+            points = model.with_unknowns(points, elastic[0])
+            if closest is None or elastic[1] < closest[1]["obstacles"]:
+                closest = points, instance.residuals(separation, points) | {"obstacles": float(elastic[1])}
+            why = why or missed(instance, separation, points, elastic[1])
+            shape = instance.shape(points)
+            room = instance.room(shape)
+        return separation, points, why, closest
+
+    def _warmer(
+        self,
+        instance: Instance,
+        separation: Separation,
+        points: Array,
+        residuals: dict[str, float],
+        warm_start: Curve | None,
+    ) -> Array:
+        """The neighbouring probe's curve instead of ``points`` where it violates less."""
+        if warm_start is None or warm_start.t_start > instance.problem.t_rep + 1e-9:
+            return points
+        worst = largest_violation(residuals)
+        if worst <= 0.0:
+            return points
+        model, t_rep = instance.model, instance.problem.t_rep
+        shifted = (
+            fit_to_curve(warm_start, t_rep, len(points), self.degree, self.spacing).points - instance.origin
+        )
+        warm = model.with_unknowns(points, model.unknowns(shifted))
+        return warm if max(instance.residuals(separation, warm).values()) < worst else points
+
+    def _run(
+        self, instance: Instance, points: Array, low: Array, high: Array, deadline: float | None
+    ) -> tuple[Array, SolveStatus, str, int]:
+        """One NLP: the new control points, the status, the solver's word, the iterations."""
+        model = instance.model
+        x0, slope, data = model.unknowns(points), instance.slope, instance.sample_data(points)
+        solution = model.solve(x0, data, slope, low, high, deadline)
+        status, word = status_of(model, solution), solution.word
+        if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
+            # An SQP that does not converge proves nothing; IPOPT has the last word.
+            oracle = build_model(replace(model.structure, solver="ipopt"))
+            solution = oracle.solve(x0, data, slope, low, high, deadline)
+            status, word = status_of(oracle, solution), f"{word}, then IPOPT: {solution.word}"
+        return model.with_unknowns(points, solution.x), status, word, solution.iterations
+
+
+def _answered(instance: Instance, points: Array, residuals: dict[str, float]) -> bool:
+    """Whether the optimum of the linear rows keeps the nonlinear ones too, and so is the NLP's.
+
+    Only where there are few enough of those to look at (s alone); IPOPT is left to find its own.
+    """
+    if points is not instance.relaxed or instance.model.structure.solver != "sqpmethod":
+        return False
+    return (
+        not instance.problem.lateral and largest_violation(residuals) <= 0.0 and instance.keeps_circle(points)
+    )
+
+
+def _require(problem: RepairProblem) -> None:
+    if not problem.t_end - problem.t_rep > 1e-9:
+        raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
+    if not np.isfinite(problem.start).all():
+        raise BackendError(f"the state at t_rep = {problem.t_rep:g} s is not finite")
+
+
+def make(config: Config) -> CasadiBackend:
+    """The backend as the configuration describes it."""
+    return CasadiBackend(config.casadi, degree=config.repair.degree, spacing=config.repair.spacing)

@@ -1,0 +1,131 @@
+"""CasADi functions that read and write NumPy arrays, and a watch that stops a solver in time."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.errors import BackendError
+
+__all__ = [
+    "Buffered",
+    "Deadline",
+    "deadline_callback",
+    "last_line",
+    "quadratic_program",
+    "sparse",
+    "unavailable",
+]
+
+
+class Buffered:
+    """A CasADi function that reads and writes NumPy arrays of its own.
+
+    Called with DM it spends several times what a small QP takes on converting them.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        All its inputs dense, or given in ``fixed``.
+    fixed : casadi.DM
+        Inputs that never change, by name.
+    """
+
+    def __init__(self, function: Any, **fixed: Any) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._inputs: dict[str, Array] = {}
+        # An input that is left out would be read as zeros, or crash the plugin: all are set.
+        for k, name in enumerate(function.name_in()):
+            value = np.full(function.nnz_in(k), function.default_in(k))
+            if name in fixed:
+                value[:] = fixed[name].nonzeros()
+            self._inputs[name] = value
+            self._buffer.set_arg(k, value.data)
+        self._outputs: dict[str, Array] = {}
+        for k, name in enumerate(function.name_out()):
+            self._outputs[name] = np.zeros(function.nnz_out(k))
+            self._buffer.set_res(k, self._outputs[name].data)
+
+    def __call__(self, **values: Array) -> dict[str, Array]:
+        """Evaluate; the outputs by name are overwritten by the next call."""
+        for name, value in values.items():
+            self._inputs[name][:] = value
+        try:
+            self._evaluate()
+        except SystemError as error:  # what an interrupt becomes on its way through CasADi's buffers
+            if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+                raise KeyboardInterrupt from None
+            raise
+        return self._outputs
+
+    def stats(self) -> dict[str, Any]:
+        """The solver's statistics of the last call."""
+        return dict(self._buffer.stats())
+
+
+class Deadline:
+    """Holds CasADi's callback and the time at which it stops the solver."""
+
+    def __init__(self) -> None:
+        self.at = float("inf")
+        self.callback: Any = None
+
+
+def deadline_callback(nlp: dict[str, Any]) -> Deadline:
+    import casadi as ca
+
+    holder = Deadline()
+    sizes = {"x": nlp["x"].numel(), "f": 1, "g": nlp["g"].numel(), "lam_x": nlp["x"].numel(),
+             "lam_g": nlp["g"].numel(), "lam_p": nlp["p"].numel()}  # fmt: skip
+
+    class Watch(ca.Callback):
+        def __init__(self) -> None:
+            ca.Callback.__init__(self)
+            self.construct("watch", {})
+
+        def get_n_in(self) -> int:
+            return int(ca.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_name_in(self, i: int) -> str:
+            return str(ca.nlpsol_out(i))
+
+        def get_name_out(self, i: int) -> str:
+            return "ret"
+
+        def get_sparsity_in(self, i: int) -> Any:
+            return ca.Sparsity.dense(sizes[ca.nlpsol_out(i)], 1)
+
+        def eval(self, arg: Any) -> list[int]:
+            return [1 if time.perf_counter() > holder.at else 0]
+
+    holder.callback = Watch()
+    return holder
+
+
+def quadratic_program(name: str, hessian: Any, matrix: Any) -> Buffered:
+    import casadi as ca
+
+    shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
+    function = ca.conic(name, "daqp", shapes, {"error_on_fail": False})
+    return Buffered(function, h=hessian, a=matrix)
+
+
+def sparse(matrix: Array) -> Any:
+    import casadi as ca
+
+    return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
+
+
+def unavailable(error: Exception) -> BackendError:
+    return BackendError(f"CasADi cannot make the solver: {last_line(error)}")
+
+
+def last_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__

@@ -1,0 +1,107 @@
+"""The drivability checker's kinematic single-track (KS) model: its states, its word on single transitions."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from repair.vehicle.parameters import Vehicle
+    from repair.vehicle.states import DrivenStates
+
+__all__ = ["OfficialReport", "official_check", "to_ks_states"]
+
+
+@dataclass(frozen=True)
+class OfficialReport:
+    """Answer of :func:`official_check`.
+
+    Attributes
+    ----------
+    transitions : (n,) int array
+        The transitions asked about.
+    ok : (n,) bool array
+    reasons : dict
+        Transition -> why not, for every transition that is not ok.
+    """
+
+    transitions: npt.NDArray[np.intp]
+    ok: npt.NDArray[np.bool_]
+    reasons: dict[int, str]
+
+
+def official_check(
+    states: DrivenStates, dt: float, vehicle: Vehicle, transitions: Iterable[int] | None = None
+) -> OfficialReport:
+    """Ask the drivability checker about single transitions.
+
+    Parameters
+    ----------
+    states : DrivenStates
+        At the scenario's time steps.
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
+    transitions : iterable of int, optional
+        Transition i leads from state i to state i + 1; by default all.
+
+    Returns
+    -------
+    OfficialReport
+        An exception inside the drivability checker is a "no" with its message as the reason.
+    """
+    from commonroad.common.solution import VehicleType
+    from commonroad_dc.feasibility.feasibility_checker import state_transition_feasibility
+    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+
+    asked = np.arange(len(states) - 1) if transitions is None else np.array(list(transitions), dtype=np.intp)
+    ks = to_ks_states(states, 0)
+    dynamics = VehicleDynamics.KS(VehicleType(vehicle.type_id))
+    reasons: dict[int, str] = {}
+    for i in asked.tolist():
+        values = [
+            (s.position[0], s.position[1], s.steering_angle, s.velocity, s.orientation) for s in ks[i : i + 2]
+        ]
+        if not np.isfinite(values).all():
+            reasons[i] = "a state is not finite"
+            continue
+        try:
+            with warnings.catch_warnings():  # of its integrator and optimiser, about inputs they only try
+                warnings.simplefilter("ignore")
+                feasible, _ = state_transition_feasibility(ks[i], ks[i + 1], dynamics, dt)
+        except Exception as error:  # the checker wraps whatever happens into a bare Exception
+            cause = error.__cause__ or error
+            reasons[i] = f"drivability checker: {type(cause).__name__}: {cause}"
+            continue
+        if not feasible:
+            reasons[i] = "no input of the KS model leads to the next state"
+    return OfficialReport(
+        asked, np.array([i not in reasons for i in asked.tolist()], dtype=np.bool_), reasons
+    )
+
+
+def to_ks_states(states: DrivenStates, initial_time_step: int) -> list[Any]:
+    """The states as ``commonroad.scenario.state.KSState``, one time step apart.
+
+    Values are plain floats (the solution writer then writes them so that reading gives the same
+    numbers); orientations are brought into [-pi, pi], as CommonRoad demands.
+    """
+    from commonroad.scenario.state import KSState
+
+    wrapped = np.arctan2(np.sin(states.orientation), np.cos(states.orientation))
+    rows = np.column_stack((states.steering, states.speed, wrapped)).tolist()
+    return [
+        KSState(
+            time_step=initial_time_step + i,
+            position=np.array([states.x[i], states.y[i]]),
+            steering_angle=steering,
+            velocity=speed,
+            orientation=orientation,
+        )
+        for i, (steering, speed, orientation) in enumerate(rows)
+    ]

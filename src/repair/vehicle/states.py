@@ -1,0 +1,48 @@
+"""States of a driven vehicle over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from repair.arrays import Array
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["DrivenStates"]
+
+
+@dataclass(frozen=True)
+class DrivenStates:
+    """States of the kinematic single-track model, all (K,).
+
+    Attributes
+    ----------
+    t : array
+        Time [s].
+    x, y : array
+        Centre of the vehicle [m].
+    steering : array
+        Steering angle delta of the front wheels [rad].
+    speed : array
+        Speed at the rear axle [m/s].
+    orientation : array
+        Orientation psi of the body [rad], unwrapped.
+    """
+
+    t: Array
+    x: Array
+    y: Array
+    steering: Array
+    speed: Array
+    orientation: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def every(self, n: int) -> DrivenStates:
+        """Every ``n``-th state, the first included."""
+        return DrivenStates(
+            self.t[::n], self.x[::n], self.y[::n], self.steering[::n], self.speed[::n], self.orientation[::n]
+        )

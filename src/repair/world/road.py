@@ -1,0 +1,216 @@
+"""The edge of the road: whether the ego's oriented rectangle lies properly inside.
+
+The verdicts are at least as strict as those of the drivability checker
+(``commonroad_dc.feasibility.solution_checker``), see :class:`RoadBoundary`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.arrays import Array
+
+if TYPE_CHECKING:
+    from repair.vehicle.parameters import Vehicle
+
+__all__ = ["RoadBoundary", "grouping"]
+
+
+# A prepared geometry must not be asked by two threads at once, and shapely lets other threads run.
+_PREPARED = Lock()
+# The rectangle may come this close to the edge [m] only where the exact test says so.
+_TOUCH = 1e-6
+# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
+_BOX = 4.0
+
+
+class RoadBoundary:
+    """The road as one region: the ego's rectangle must lie properly inside.
+
+    The region is the union of the lane sections, a section being a lanelet with all its lateral
+    neighbours; the drivability checker's triangulated boundary
+    (``solution_checker._construct_boundary_checker``) fills what is outside the same sections. That
+    triangulation needs the package ``triangle``, whose licence is not free; where it is installed,
+    :meth:`official_off_road` asks it as well.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+        Only read.
+    vehicle : Vehicle
+        The ego.
+    """
+
+    def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
+        import shapely
+
+        self._scenario = scenario
+        self._corners = 0.5 * np.array(
+            [[vehicle.length, vehicle.width], [-vehicle.length, vehicle.width],
+             [-vehicle.length, -vehicle.width], [vehicle.length, -vehicle.width]]
+        )  # fmt: skip
+        outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
+        self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
+        shapely.prepare(self.region)
+        # More than the rounding of any coordinate of the region.
+        self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
+        self._triangles: Any = None
+
+    def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
+
+        Parameters
+        ----------
+        x, y, orientation : (K,) array
+            Centre [m] and orientation [rad] of the ego.
+        """
+        known = self._surely_inside(x, y, orientation)
+        if known.all():
+            return None
+        unsure = np.flatnonzero(~known)
+        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
+        return None if inside.all() else int(unsure[np.argmin(inside)])
+
+    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
+        """Whether polygons (K, V, 2) lie properly inside of the region."""
+        import shapely
+
+        polygons = shapely.polygons(outlines)
+        with _PREPARED:
+            return np.asarray(shapely.contains_properly(self.region, polygons))
+
+    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
+        """Poses (K,) that lie inside because a larger box does; False says nothing.
+
+        One box, turned like the pose in its middle, holds several consecutive poses: asking about
+        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
+        a pose turned by an angle t reaches farther, at most size * |t|.
+        """
+        count = len(x)
+        known = np.zeros(count, dtype=np.bool_)
+        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
+        if not np.isfinite(np.array((x, y, orientation))).all():
+            return known
+        size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
+        if size < 2:
+            return known
+        pose = grouping(count, size)
+        middle = pose[size // 2]
+        centre = x + 1j * y
+        heading, origin = orientation[middle], centre[middle]
+        axis = np.exp(1j * heading)
+        seen = ((centre[pose] - origin) * axis.conj()).view(np.float64)
+        turn = np.maximum.reduce(np.abs(orientation[pose] - heading), axis=0)
+        half = self._corners[0] + self.spare + turn[:, None] * self._corners[0, ::-1]
+        sides = np.empty((len(middle), 4))
+        sides[:, :2] = np.minimum.reduce(seen, axis=0).reshape(-1, 2) - half
+        sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
+        corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
+        corners = corners * axis[:, None] + origin[:, None]
+        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
+        known[pose[:, inside] if not inside.all() else slice(None)] = True
+        return known
+
+    def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
+        """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
+        cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
+        forward, left = self._corners[:, 0], self._corners[:, 1]
+        corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
+        return np.nan_to_num(np.stack(corners, axis=2), nan=1e12, posinf=1e12, neginf=-1e12)
+
+    def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
+        """As :meth:`first_off_road`, by the drivability checker's triangulation, built at the first call.
+
+        The two differ only next to ends of the map: the triangulation has no edge across the end of a
+        section that has successors, and a triangle may reach into the road there. None also where the
+        triangulation cannot be had (:attr:`official_available`).
+        """
+        if not self.official_available:
+            return None
+        import shapely
+
+        hits = self._triangles.query(
+            shapely.polygons(self._outline(x, y, orientation)), predicate="intersects"
+        )
+        return int(hits[0].min()) if hits.size else None
+
+    @property
+    def official_available(self) -> bool:
+        """Whether the checker can triangulate this road: it fails on some, or lacks ``triangle``."""
+        if self._triangles is None:
+            import shapely
+            from commonroad_dc.boundary import construction
+
+            try:
+                parts = construction.construct(self._scenario, ["section_triangles", "triangulation"])
+            except Exception:  # whatever goes wrong in there, there is no triangulation to ask
+                self._triangles = False
+            else:
+                # As plain geometry: pycrcc reports objects that live until the interpreter's exit as leaks.
+                corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
+                self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
+        return self._triangles is not False
+
+
+# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
+_MOST = 32
+_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
+
+
+@lru_cache(maxsize=256)
+def grouping(count: int, size: int) -> npt.NDArray[np.intp]:
+    """Indices (size, G) of consecutive poses in groups; the last pose fills up the last group."""
+    groups = np.minimum(np.arange(-(-count // size) * size), count - 1).reshape(-1, size)
+    by_place = np.ascontiguousarray(groups.T)
+    by_place.setflags(write=False)
+    return by_place
+
+
+def _section_outlines(network: Any) -> list[Array]:
+    """Outline (V, 2) of every lane section: a lanelet with its lateral neighbours, right to left."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
+    left_over = dict.fromkeys(lanelets)
+    outlines = []
+    while left_over:
+        first, _ = left_over.popitem()
+        start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
+        chain = _neighbours(lanelets, *start, to_the_left=True)
+        for member, _ in chain:
+            left_over.pop(member, None)
+        lines = [_bound(lanelets[chain[0][0]], chain[0][1], left=False)]
+        lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
+        ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
+        starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
+        outlines.append(np.concatenate((lines[0], ends, lines[-1][::-1], starts)))
+    return outlines
+
+
+def _neighbours(
+    lanelets: Mapping[int, Any], lanelet_id: int, forward: bool, to_the_left: bool
+) -> list[tuple[int, bool]]:
+    """The lanelet and those beside it on one side, each with whether it runs in the chain's direction."""
+    chain = [(lanelet_id, forward)]
+    seen = {lanelet_id}
+    while True:
+        lanelet = lanelets[lanelet_id]
+        if forward == to_the_left:
+            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
+        else:
+            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
+        if lanelet_id not in lanelets or lanelet_id in seen:
+            return chain
+        forward = forward == bool(same)
+        chain.append((lanelet_id, forward))
+        seen.add(lanelet_id)
+
+
+def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
+    """Left or right bound (V, 2) of a lanelet, seen and ordered along the chain's direction."""
+    vertices = lanelet.left_vertices if left == forward else lanelet.right_vertices
+    return np.asarray(vertices[:: 1 if forward else -1, :2], dtype=np.float64)
