@@ -13,12 +13,11 @@ from typing import Any
 from benchmarks import literal
 from repair.config import load_config
 from repair.paper.synthetic import write_scenario
-from repair.prepare import prepare
+from repair.prepare import Prepared, prepare
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import Scene
 from repair.search.result import SearchResult
 from repair.search.search import search_f_ttr
-from repair.situation import Prepared
 from repair.solvers.registry import make_backend
 
 OFFICIAL_FILE = "DEU_Flensburg-6_1_T-1.xml"

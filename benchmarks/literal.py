@@ -648,7 +648,8 @@ def best_of(call: Any, repeats: int, number: int = 1) -> float:
 
 def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     """Time of one evaluation of J and of J' with gradient [s], literal and as the package does it."""
-    from repair.solvers.ego import pairs as fast
+    from repair.solvers.ego.backend import EgoBackend
+    from repair.solvers.ego.minimise import minimiser
 
     p, dt, ego = config.repair.degree, config.repair.spacing, config.ego
     stages = repair_once(problem, ego, p, dt)
@@ -657,12 +658,13 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     weights, again = ego.deform, ego.refine
     costs: list[Any] = []
 
-    class Spy(fast.EgoBackend):
-        def _minimise(self, cost: Any, *arguments: Any, **keys: Any) -> Any:
-            costs.append(cost)
-            return super()._minimise(cost, *arguments, **keys)
+    usual = minimiser(ego)
 
-    Spy(ego, degree=p, spacing=dt).solve(problem)
+    def spy(cost: Any, *arguments: Any, **keys: Any) -> Any:
+        costs.append(cost)
+        return usual(cost, *arguments, **keys)
+
+    EgoBackend(ego, degree=p, spacing=dt, minimise=spy).solve(problem)
     times = {
         "literal J": best_of(
             lambda: deformation_cost(

@@ -15,45 +15,46 @@ from benchmarks import literal
 from benchmarks.cases import Case, Context, case, chosen_problem
 from benchmarks.measure import Report, Row, Spread, Times, row, together
 
-#: phase -> where its time is spent, "module:name" or "module:Class.name". Time inside a phase that belongs
-#: to another phase counts for that other phase only.
+#: phase -> where its time is spent, "module:name" or "module:Class.name"; a function that is imported is
+#: named where it is called. Time inside a phase that belongs to another phase counts for that other one only.
 CHECKS = {
-    "path in the plane": "repair.checker:Checker._spliced",
-    "driven states": "repair.checker:body_angles",
-    "limits": "repair.checker:Checker._limits",
-    "margin check": "repair.checker:Checker._margin",
-    "collision check": "repair.collision:CollisionWorld.contact_along",
-    "road check": "repair.checker:Checker._off_road",
-    "kinematic check, direct": "repair.checker:Checker._kinematics",
-    "kinematic check, drivability checker": "repair.checker:official_check",
-    "rest of the check": "repair.checker:Checker.check",
-    "problem, culling": "repair.problems:ProblemFactory.at",
-    "ways past (passings)": "repair.problems:open_passings",
+    "path in the plane": "repair.check.checker:Checker._spliced",
+    "driven states": "repair.vehicle.model:KinematicSingleTrack.angles",
+    "limits": "repair.check.checker:exceeded",
+    "margin check": "repair.check.checker:Checker._margin",
+    "collision check": "repair.world.collision:CollisionWorld.contact_along",
+    "road check": "repair.check.checker:Checker._off_road",
+    "kinematic check, direct": "repair.vehicle.model:KinematicSingleTrack.first_undrivable",
+    "kinematic check, drivability checker": "repair.vehicle.model:official_check",
+    "rest of the check": "repair.check.checker:Checker.check",
+    "problem, culling": "repair.problem.factory:ProblemFactory.at",
+    "ways past (passings)": "repair.problem.factory:open_passings",
 }
 SOLVING = {
     "ego": {
-        "fit to the reference": "repair.solvers.ego:fit_to_curve",
-        "{p, v} pairs": "repair.solvers.ego:anchor_pairs",
-        "cost and gradient": "repair.solvers.spline_cost:SplineCost.__call__",
-        "deformation": "repair.solvers.ego:EgoBackend._deform",
-        "refinement": "repair.solvers.ego:EgoBackend._refine",
-        "rest of the solve": "repair.solvers.ego:EgoBackend.solve",
+        "fit to the reference": "repair.solvers.ego.backend:fit_to_curve",
+        "{p, v} pairs": "repair.solvers.ego.stages:anchor_pairs",
+        "cost and gradient": "repair.solvers.ego.spline_cost:SplineCost.__call__",
+        "deformation": "repair.solvers.ego.stages:Stages.deform",
+        "refinement": "repair.solvers.ego.stages:Stages.refine",
+        "rest of the solve": "repair.solvers.ego.backend:EgoBackend.solve",
     },
     "qptr": {
-        "corridor": "repair.baselines.qptr:build_corridor",
-        "QP assembly": "repair.baselines.qptr:_axis",
-        "QP": "repair.baselines.qptr:solve_projection",
-        "rest of the solve": "repair.baselines.qptr:QptrBackend.solve",
+        "corridor": "repair.baselines.qptr.backend:build_corridor",
+        "QP assembly": "repair.baselines.qptr.backend:_axis",
+        "QP": "repair.baselines.qptr.backend:solve_projection",
+        "rest of the solve": "repair.baselines.qptr.backend:QptrBackend.solve",
     },
     "casadi": {
-        "NLP look-up": "repair.solvers.casadi_nlp:build_model",
-        "NLP layout": "repair.solvers.casadi_nlp:CasadiBackend._instance",
-        "separation": "repair.solvers.casadi_nlp:separate",
-        "rounds of windows": "repair.solvers.casadi_nlp:CasadiBackend._open",
-        "residuals": "repair.solvers.nlp_instance:Instance.residuals",
-        "QP (presolve)": "repair.solvers.nlp_model:Model.presolve",
-        "NLP solve": "repair.solvers.nlp_model:Model.solve",
-        "rest of the solve": "repair.solvers.casadi_nlp:CasadiBackend.solve",
+        "NLP look-up": "repair.solvers.casadi.backend:build_model",
+        "NLP layout": "repair.solvers.casadi.backend:lay_out",
+        "separation": "repair.solvers.casadi.sides:separate",
+        "separation, later rounds": "repair.solvers.casadi.backend:separate",
+        "rounds of windows": "repair.solvers.casadi.backend:open_sides",
+        "residuals": "repair.solvers.casadi.backend:residuals_of",
+        "QP (presolve)": "repair.solvers.casadi.model:Model.presolve",
+        "NLP solve": "repair.solvers.casadi.model:Model.solve",
+        "rest of the solve": "repair.solvers.casadi.backend:CasadiBackend.solve",
     },
 }
 LITERAL = {
@@ -89,9 +90,11 @@ class Stopwatch:
         self.spent: dict[str, float] = {}
         self._inner: list[float] = []
 
-    def _wrapped(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+    def timed(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        """The same call, whose own time counts for a phase; that of other timed calls inside it does not."""
+
         @wraps(call)
-        def timed(*args: Any, **keys: Any) -> Any:
+        def measured(*args: Any, **keys: Any) -> Any:
             self._inner.append(0.0)
             begin = time.process_time()
             try:
@@ -102,7 +105,7 @@ class Stopwatch:
                 if self._inner:
                     self._inner[-1] += lasted
 
-        return timed
+        return measured
 
     @contextmanager
     def running(self) -> Iterator[None]:
@@ -114,7 +117,7 @@ class Stopwatch:
                 if found is not None:
                     original = found[0].__dict__.get(found[1], getattr(*found))
                     before.append((*found, original))
-                    setattr(*found, self._wrapped(name, getattr(*found)))
+                    setattr(*found, self.timed(name, getattr(*found)))
             yield
         finally:
             for owner, name, original in reversed(before):
@@ -264,17 +267,16 @@ def nlp_build(context: Context, number: int) -> Report:
     """Making the NLP: the first time for a structure, and every time after."""
     report, group = Report(), f"NLP build: {context.title(number)}"
     for backend in ("casadi sqpmethod", "casadi ipopt"):
-        from repair.solvers.casadi import words as casadi_nlp
+        from repair.solvers.casadi.model import build_model as build
 
         made: Case = case(context.path(number), number, backend)
         problem = made.prepared.source.at(0.0)[0]
-        structure = made.backend._structure(problem, timed=False)
-        build = casadi_nlp.build_model
+        structure = made.backend.structure(problem)
         fresh = getattr(build, "__wrapped__", build)
 
         def first(fresh: Any = fresh, structure: Any = structure) -> None:
             made = fresh(structure)
-            assert made._function is not None  # the NLP is made when it is first asked for
+            assert made.nlp is not None  # the NLP is made when it is first asked for
 
         calls = {"first": first, "again": lambda b=build, s=structure: b(s)}
         times = together(calls, context.rounds(9, 3), warm_up=1)

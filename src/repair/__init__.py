@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from repair.api import RepairResult, repair
-    from repair.backend.base import RepairBackend, SolveResult, SolveStatus
+    from repair.backend.base import (
+        BackendSpec,
+        Capabilities,
+        Closest,
+        RepairBackend,
+        SolveResult,
+        SolveStatus,
+    )
+    from repair.check.registry import register as register_check
     from repair.check.verdict import Conflict, Reason, Verdict
     from repair.config import Config, load_config, preset_names
     from repair.curves.base import FrenetTrajectory
@@ -28,25 +36,35 @@ if TYPE_CHECKING:
         RepairError,
         ScenarioError,
     )
-    from repair.prepare import prepare
+    from repair.io.result_json import load_result
+    from repair.metrics.registry import register as register_metric
+    from repair.outcome.data import Outcome
+    from repair.prepare import Prepared, prepare
     from repair.problem.problem import Maneuver, RepairProblem
+    from repair.reference.registry import register as register_reference
+    from repair.save import register as register_format
     from repair.scene.commonroad import load_scene, scene_from_scenario
     from repair.scene.scene import Scene
     from repair.search.result import Probe, SearchResult, SearchStatus
-    from repair.situation import Prepared
+    from repair.situation import Situation
     from repair.solvers.registry import available as available_backends
     from repair.solvers.registry import backend_names
     from repair.solvers.registry import register as register_backend
+    from repair.vehicle.model import register as register_vehicle
 
     __version__: str
 
 __all__ = [
     "BackendError",
+    "BackendSpec",
+    "Capabilities",
+    "Closest",
     "Config",
     "ConfigError",
     "Conflict",
     "FrenetTrajectory",
     "Maneuver",
+    "Outcome",
     "OutputError",
     "Prepared",
     "Probe",
@@ -60,6 +78,7 @@ __all__ = [
     "Scene",
     "SearchResult",
     "SearchStatus",
+    "Situation",
     "SolveResult",
     "SolveStatus",
     "UniformBSpline",
@@ -68,17 +87,25 @@ __all__ = [
     "available_backends",
     "backend_names",
     "load_config",
+    "load_result",
     "load_scene",
     "prepare",
     "preset_names",
     "register_backend",
+    "register_check",
+    "register_format",
+    "register_metric",
+    "register_reference",
+    "register_vehicle",
     "repair",
     "scene_from_scenario",
 ]
 
 _NAMES: dict[str, tuple[str, ...]] = {
     "repair.api": ("RepairResult", "repair"),
-    "repair.backend.base": ("RepairBackend", "SolveResult", "SolveStatus"),
+    "repair.backend.base": (
+        "BackendSpec", "Capabilities", "Closest", "RepairBackend", "SolveResult", "SolveStatus",
+    ),
     "repair.check.verdict": ("Conflict", "Reason", "Verdict"),
     "repair.config": ("Config", "load_config", "preset_names"),
     "repair.curves.base": ("FrenetTrajectory",),
@@ -87,18 +114,30 @@ _NAMES: dict[str, tuple[str, ...]] = {
         "BackendError", "ConfigError", "OutputError", "ReferenceTrajectoryError", "RepairError",
         "ScenarioError",
     ),
-    "repair.prepare": ("prepare",),
+    "repair.outcome.data": ("Outcome",),
+    "repair.prepare": ("Prepared", "prepare"),
+    "repair.io.result_json": ("load_result",),
     "repair.problem.problem": ("Maneuver", "RepairProblem"),
     "repair.scene.commonroad": ("load_scene", "scene_from_scenario"),
     "repair.scene.scene": ("Scene",),
     "repair.search.result": ("Probe", "SearchResult", "SearchStatus"),
-    "repair.situation": ("Prepared",),
+    "repair.situation": ("Situation",),
     "repair.solvers.registry": ("backend_names",),
 }  # fmt: skip
 # public name -> (module, name in it)
 _HOME = {name: (module, name) for module, names in _NAMES.items() for name in names}
 _HOME["available_backends"] = ("repair.solvers.registry", "available")
-_HOME["register_backend"] = ("repair.solvers.registry", "register")
+_HOME |= {
+    f"register_{kind}": (module, "register")
+    for kind, module in {
+        "backend": "repair.solvers.registry",
+        "check": "repair.check.registry",
+        "format": "repair.save",
+        "metric": "repair.metrics.registry",
+        "reference": "repair.reference.registry",
+        "vehicle": "repair.vehicle.model",
+    }.items()
+}
 
 
 def __getattr__(name: str) -> Any:

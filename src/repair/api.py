@@ -1,27 +1,39 @@
-"""The one way through the house: scene -> reference -> conflict -> search -> result."""
+"""The one way through the house: scene -> situation -> search -> result."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from repair.backend.base import Capabilities, RepairBackend
+from repair.baselines.evasive.at_ttr import AtTtr
 from repair.check.peaks import Peaks
-from repair.config import Config, load_config
+from repair.config.load import load_config
+from repair.config.schema import Config
 from repair.curves.base import Curve, SplicedCurve
 from repair.errors import RepairError
-from repair.prepare import Phases, prepare
+from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
+from repair.metrics.base import Asked, MetricValue
+from repair.metrics.registry import measure
+from repair.outcome.build import outcome_of
+from repair.outcome.data import Outcome
+from repair.outcome.record import driven_curve
+from repair.prepare import Phases, Prepared, prepare
+from repair.save import Saved, saved
+from repair.scene.commonroad import load_scene
+from repair.scene.scene import Scene
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
-from repair.situation import Prepared
 from repair.solvers.registry import make_backend
 from repair.vehicle.states import DrivenStates
 
 if TYPE_CHECKING:
-    from repair.scene.scene import Scene
+    from repair.search.settings import SearchConfig
 
-__all__ = ["RepairResult", "repair"]
+__all__ = ["RepairResult", "find", "repair", "search"]
 
 
 @dataclass(frozen=True)
@@ -39,8 +51,11 @@ class RepairResult:
         Extremes of the repaired part; None without a repair.
     phases : dict
         Wall time by phase [s].
-    ttr : float or None
-        TTR by fixed evasive manoeuvres [s] with ``driver: at_ttr`` (-inf: none helps); else None.
+    metrics : dict
+        The metrics that were asked for (``metrics: [ttr, ...]``), by name; with ``driver: at_ttr`` also
+        the TTR.
+    capabilities : Capabilities
+        Of the backend.
     """
 
     prepared: Prepared
@@ -48,7 +63,8 @@ class RepairResult:
     states: DrivenStates
     peaks: Peaks | None
     phases: dict[str, float]
-    ttr: float | None = None
+    metrics: dict[str, MetricValue] = field(default_factory=dict)
+    capabilities: Capabilities = field(default_factory=Capabilities)
 
     @property
     def status(self) -> SearchStatus:
@@ -66,42 +82,47 @@ class RepairResult:
         return self.search.f_ttr
 
     @property
+    def ttr(self) -> float | None:
+        """TTR by fixed evasive manoeuvres [s] (-inf: none helps); None where it was not asked for."""
+        return self.metrics["ttr"].value if "ttr" in self.metrics else None
+
+    @property
     def curve(self) -> Curve:
         """What is driven then, in the Frenet frame; the reference where there is no repair."""
-        if self.search.curve is None:
-            return self.prepared.reference
-        return SplicedCurve(self.prepared.reference, self.search.curve, float(self.search.f_ttr or 0.0))
+        return driven_curve(self.prepared, self.search)
 
     @property
     def trajectory(self) -> Any:
         """What is driven then, as a ``commonroad.scenario.trajectory.Trajectory`` of KS states."""
-        from repair.io.commonroad import to_trajectory
+        return to_trajectory(self.prepared.scene, self.states)
 
-        return to_trajectory(self)
+    @cached_property
+    def outcome(self) -> Outcome:
+        """The pure data of it, which figures and tables are made from."""
+        return outcome_of(
+            self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities
+        )
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
         """The ego as a ``commonroad.scenario.obstacle.DynamicObstacle``, to add to a scenario."""
-        from repair.io.commonroad import to_dynamic_obstacle
-
-        return to_dynamic_obstacle(self, obstacle_id)
+        return to_dynamic_obstacle(self.prepared.scene, self.states, obstacle_id)
 
     def to_solution(self) -> Any:
         """The trajectory as a ``commonroad.common.solution.Solution``."""
-        from repair.io.commonroad import to_solution
-
-        return to_solution(self)
+        return to_solution(self.prepared.scene, self.states, self.status)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``result.json``."""
-        from repair.io.result_json import to_dict
+        return self.outcome.record
 
-        return to_dict(self)
+    def saved(self, folder: str | Path, *, figure: bool = True) -> tuple[Outcome, list[Path]]:
+        """Write the result into a folder; its outcome with the names of the files, and their paths."""
+        made = Saved(self.outcome, self.prepared.scene, self.states, self.status, figure)
+        return saved(made, Path(folder))
 
     def save(self, folder: str | Path, *, figure: bool = True) -> list[Path]:
-        """Write ``result.json``, the solution file and the figure into ``folder``."""
-        from repair.save import save
-
-        return save(self, Path(folder), figure=figure)
+        """Write ``result.json``, the solution file, the figures and what they show into ``folder``."""
+        return self.saved(folder, figure=figure)[1]
 
 
 def repair(
@@ -127,7 +148,8 @@ def repair(
     Raises
     ------
     RepairError
-        If the input cannot be used; its sentence says why.
+        If the input cannot be used; its sentence says why. A scene that was loaded with other settings
+        than the configuration asks for is such input.
     """
     if config is not None and keys:
         raise RepairError("give either a config or configuration keys, not both")
@@ -135,51 +157,71 @@ def repair(
     backend = make_backend(config.backend, config)
     phases = Phases()
     with phases("load"):
-        scene = _scene(scenario, config)
-    prepared = prepare(scene, config)
-    return search(prepared, backend, on_probe=on_probe, phases=phases.seconds)
+        scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
+    return search(prepare(scene, config), backend, on_probe=on_probe, phases=phases.seconds)
 
 
 def search(
-    prepared: Prepared, backend: Any, *, on_probe: Any = None, phases: dict[str, float] | None = None
+    prepared: Prepared,
+    backend: RepairBackend,
+    *,
+    on_probe: Callable[[Probe], None] | None = None,
+    phases: dict[str, float] | None = None,
 ) -> RepairResult:
-    """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, one repair at the TTR)."""
+    """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, the same search at the TTR alone)."""
     timed = Phases(dict(phases or {}))
     timed.seconds.update(prepared.phases)
-    ttr: float | None = None
+    asked = Asked(prepared, prepared.config.evasive)
     with timed("search"):
-        if prepared.config.driver == "at_ttr":
-            from repair.baselines.evasive.problems import repair_at_ttr
-
-            answer = repair_at_ttr(prepared, backend, on_probe=on_probe)
-            found, ttr = answer.search, answer.ttr
-        else:
-            found = search_f_ttr(
-                prepared.source, prepared.conflict, backend, prepared.checker, prepared.config.search,
-                on_probe=on_probe,
-            )  # fmt: skip
+        found = find(prepared, backend, asked=asked, on_probe=on_probe)
     timed.seconds["solve"] = sum(p.solve.solve_time for p in found.probes)
     timed.seconds["build"] = sum(p.solve.build_time for p in found.probes)
     timed.seconds["check"] = sum(p.check_time for p in found.probes)
+    config = prepared.config
+    wanted = [
+        *config.metrics,
+        *(["ttr"] if config.driver == "at_ttr" and "ttr" not in config.metrics else []),
+    ]
+    metrics: dict[str, MetricValue] = {}
+    if wanted:
+        with timed("metrics"):
+            metrics = measure(wanted, asked)
     curve, t_end, reached = prepared.reference, prepared.t_reference, None
     if found.curve is not None:
         t_rep = float(found.f_ttr or 0.0)
         curve, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
         reached = prepared.checker.peaks(curve, t_end, t_rep)
-    states = prepared.checker.drive(curve, t_end).every(prepared.config.checker.substeps)
-    return RepairResult(prepared, found, states, reached, timed.seconds, ttr)
+    states = prepared.checker.drive(curve, t_end).every(config.checker.substeps)
+    return RepairResult(prepared, found, states, reached, timed.seconds, metrics, backend.capabilities)
 
 
-def _scene(scenario: Any, config: Config) -> Scene:
-    from repair.scene.commonroad import load_scene
-    from repair.scene.scene import Scene
+def find(
+    prepared: Prepared,
+    backend: RepairBackend,
+    *,
+    asked: Asked | None = None,
+    on_probe: Callable[[Probe], None] | None = None,
+    settings: SearchConfig | None = None,
+) -> SearchResult:
+    """The search alone, as the configuration (or other ``settings`` of the search) describes it.
 
-    if isinstance(scenario, Scene):
-        return scenario
-    return load_scene(
-        scenario,
-        planning_problem=config.scene.planning_problem,
-        vehicle=config.scene.vehicle,
-        horizon=config.scene.horizon,
-        after_prediction=config.scene.after_prediction,
-    )
+    Parameters
+    ----------
+    asked : Asked, optional
+        Where the TTR is kept that ``driver: at_ttr`` needs.
+    """
+    settings = settings or prepared.config.search
+    if prepared.config.driver != "at_ttr":
+        return search_f_ttr(
+            prepared.source, prepared.conflict, backend, prepared.checker, settings, on_probe=on_probe
+        )
+    clock = Phases()
+    with clock("ttr"):
+        asked = asked or Asked(prepared, prepared.config.evasive)
+        source = AtTtr(prepared.source, asked.evasive)
+    if settings.time_limit is not None:  # finding the TTR is part of it
+        settings = replace(settings, time_limit=max(settings.time_limit - clock.seconds["ttr"], 0.0))
+    return search_f_ttr(
+        source, prepared.conflict, backend, prepared.checker, settings,
+        visits=source.visits, on_probe=on_probe,
+    )  # fmt: skip

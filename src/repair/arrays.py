@@ -44,4 +44,5 @@ def number(value: float | None, digits: int = 9) -> float | None:
 
 
 def column(values: Any, digits: int = 9) -> list[float | None]:
+    """Finite plain floats, None for each that is not."""
     return [number(v, digits) for v in np.asarray(values, dtype=np.float64).tolist()]

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
-from repair.config import Config
+from repair.config.schema import Config
 from repair.errors import ConfigError
 from repair.problem.limits import resolve_limits
-from repair.reference.recorded import known_until, recorded_positions
-from repair.reference.registry import make_reference
+from repair.reference.recorded import known_until
+from repair.reference.registry import SOURCES, make_reference, positions_along
 from repair.scene.reframe import as_ego, reframe
-from repair.situation import Prepared
+from repair.scene.settings import LOADING, SceneConfig
+from repair.situation import Situation
+from repair.timegrid import INSTANT, on_grid
 from repair.world.occupancy import build_occupancy, shrink_to_start
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["Phases", "prepare"]
+__all__ = ["Phases", "Prepared", "prepare"]
 
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
@@ -37,12 +40,28 @@ class Phases:
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
-    def __call__(self, name: str):  # type: ignore[no-untyped-def]
+    def __call__(self, name: str) -> Iterator[None]:
+        """Add the time of a ``with`` block to a phase."""
         begin = time.perf_counter()
         try:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+
+
+@dataclass(frozen=True)
+class Prepared(Situation):
+    """A situation with the configuration that it was made by.
+
+    Attributes
+    ----------
+    config : Config
+    phases : dict
+        Wall time of the preparation by phase [s].
+    """
+
+    config: Config
+    phases: dict[str, float]
 
 
 def prepare(scene: Scene, config: Config) -> Prepared:
@@ -53,16 +72,18 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     RepairError
         If no reference can be had.
     """
+    config = _agreed(scene, config)
     phases = Phases()
-    if config.reference.source in ("recorded", "file"):
-        positions, _ = recorded_positions(scene, config.reference)
+    positions = positions_along(scene, config.reference)
+    if positions is not None:
         scene = reframe(scene, positions[: known_until(positions)])
-        if config.reference.source == "recorded" and config.reference.obstacle_id is not None:
-            scene = as_ego(scene, config.reference.obstacle_id)
+        chosen = config.reference.obstacle_id
+        if chosen is not None and SOURCES[config.reference.source].becomes_ego:
+            scene = as_ego(scene, chosen)
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
-    s_offset = 0.5 * vehicle.length + _BODY_MARGIN if s_offset is None else s_offset
-    l_offset = 0.5 * vehicle.width + _BODY_MARGIN if l_offset is None else l_offset
+    s_offset = vehicle.half_length + _BODY_MARGIN if s_offset is None else s_offset
+    l_offset = vehicle.half_width + _BODY_MARGIN if l_offset is None else l_offset
     with phases("occupancy"):
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset)
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
@@ -84,8 +105,53 @@ def prepare(scene: Scene, config: Config) -> Prepared:
             "a repair has to reach beyond it"
         )
     t_end = min(wanted, t_reference)
-    t_end = max(np.floor(t_end / scene.dt + 1e-6) * scene.dt, min(scene.dt, t_reference))
+    t_end = max(on_grid(t_end, scene.dt), min(scene.dt, t_reference))
     return Prepared(
-        scene, config, limits, occupancy, reference, checker, conflict, t_reference, float(t_end),
-        (*scene.notes, *notes, *more), phases.seconds,
-    )  # fmt: skip
+        scene=scene,
+        settings=config.repair,
+        limits=limits,
+        occupancy=occupancy,
+        reference=reference,
+        checker=checker,
+        conflict=conflict,
+        t_reference=t_reference,
+        t_end=float(t_end),
+        notes=(*scene.notes, *notes, *more, *_remarks(config, wanted, t_reference)),
+        config=config,
+        phases=phases.seconds,
+    )
+
+
+def _agreed(scene: Scene, config: Config) -> Config:
+    """The configuration with what the scene was loaded with.
+
+    Raises
+    ------
+    ConfigError
+        If it asks for something else.
+    """
+    usual, loaded = SceneConfig(), scene.settings
+    for name in LOADING:
+        asked, has = getattr(config.scene, name), getattr(loaded, name)
+        same = asked == has or (name == "planning_problem" and asked == scene.planning_problem_id)
+        if not same and (f"scene.{name}" in config.given or asked != getattr(usual, name)):
+            raise ConfigError(
+                f"the scene was loaded with scene.{name}={has}, and the configuration asks for {asked}; "
+                "load it with the configuration: repair.load_scene(path, config)"
+            )
+    if all(getattr(config.scene, name) == getattr(loaded, name) for name in LOADING):
+        return config
+    agreed = replace(config, scene=replace(config.scene, **{name: getattr(loaded, name) for name in LOADING}))
+    agreed.given = config.given
+    return agreed
+
+
+def _remarks(config: Config, wanted: float, t_reference: float) -> list[str]:
+    """Settings that were made on purpose and change nothing here."""
+    remarks = [f"{key} has no effect with {other}={value}" for key, other, value in config.without_effect()]
+    if config.repair.horizon is not None and wanted > t_reference + INSTANT:
+        remarks.append(
+            f"repair.horizon is {wanted:g} s, but what is known ends at {t_reference:g} s, "
+            "and so do the repairs"
+        )
+    return remarks

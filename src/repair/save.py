@@ -1,45 +1,150 @@
-"""The files of a result, written as one."""
+"""The files of a result, written as one; what is written is a list of formats."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from repair.io.commonroad import is_solved, to_solution
+from repair.errors import OutputError
+from repair.io.commonroad import no_solution_because, to_solution
 from repair.io.files import write_files
-from repair.io.result_json import to_dict, to_json
+from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_json
+from repair.outcome.data import Outcome
+from repair.registry import Registry, loaded
+from repair.scene.scene import Scene
+from repair.search.result import SearchStatus
+from repair.vehicle.states import DrivenStates
 
-if TYPE_CHECKING:
-    from repair.api import RepairResult
+__all__ = ["FORMATS", "Files", "Format", "Saved", "register", "saved"]
 
-__all__ = ["save", "saved"]
-
-
-# -- files -----------------------------------------------------------------------------------------
+_FIGURES = ("profiles.png", "birdseye.png")
 
 
-def save(result: RepairResult, folder: Path, *, figure: bool = True) -> list[Path]:
-    """Write ``result.json``, the solution file, and the figures; see :func:`saved`.
+@dataclass(frozen=True)
+class Saved:
+    """What a format may write from.
 
-    Returns
-    -------
-    list of Path
-        What was written, ``result.json`` first.
+    Attributes
+    ----------
+    outcome : Outcome
+    scene : Scene
+    states : DrivenStates
+        What is driven, at the scenario's steps.
+    status : SearchStatus
+    figures : bool
+        Whether figures are wanted.
     """
-    return saved(result, folder, figure=figure)[1]
+
+    outcome: Outcome
+    scene: Scene
+    states: DrivenStates
+    status: SearchStatus
+    figures: bool
+
+    @property
+    def name(self) -> str:
+        """The benchmark id, fit for the name of a file."""
+        return re.sub(r"[^\w.-]", "_", self.scene.id)[:100]
 
 
-def saved(result: RepairResult, folder: Path, *, figure: bool = True) -> tuple[dict[str, Any], list[Path]]:
-    """Write ``result.json``, the solution file, and the figures into a folder, which is made if need be.
+@dataclass(frozen=True)
+class Files:
+    """What a format writes.
 
-    A reconstruction, which nobody else has, is put beside them. Without a verified trajectory there
-    is no solution file, and one of an earlier run in the same folder is removed.
+    Attributes
+    ----------
+    files : dict
+        Name to content.
+    record : dict
+        Keys of ``result.json`` that name the files.
+    stale : tuple of str
+        Names that an earlier run would have left, and that are not written now.
+    """
+
+    files: dict[str, bytes]
+    record: dict[str, Any]
+    stale: tuple[str, ...] = ()
+
+
+Format = Callable[[Saved], Files]
+
+
+def solution_file(result: Saved) -> Files:
+    """The driven trajectory as a CommonRoad solution, where there is a verified one."""
+    name = f"solution_{result.name}.xml"
+    if no_solution_because(result.scene, result.status):
+        return Files({}, {"solution_file": None}, (name,))
+    from commonroad.common.solution import CommonRoadSolutionWriter
+
+    solution = to_solution(result.scene, result.states, result.status)
+    return Files({name: CommonRoadSolutionWriter(solution).dump().encode()}, {"solution_file": name})
+
+
+def drawing_file(result: Saved) -> Files:
+    """What the figures show, so that they can be drawn from the folder."""
+    content = drawing_bytes(result.outcome)
+    if content is None:
+        return Files({}, {"drawing_file": None}, (DRAWING_FILE,))
+    return Files({DRAWING_FILE: content}, {"drawing_file": DRAWING_FILE})
+
+
+def figure_files(result: Saved) -> Files:
+    """The figures, where they are wanted."""
+    if not result.figures:
+        return Files({}, {"figure_files": []}, _FIGURES)
+    from repair.report.birdseye import birdseye_figure
+    from repair.report.profiles import profile_figure
+    from repair.report.style import render
+
+    made = (profile_figure(result.outcome), birdseye_figure(result.outcome))
+    drawn = {name: render(figure) for name, figure in zip(_FIGURES, made, strict=True)}
+    return Files(drawn, {"figure_files": list(_FIGURES)})
+
+
+def scenario_file(result: Saved) -> Files:
+    """The scenario, if it is a reconstruction: nobody else has it."""
+    path = result.scene.path
+    if result.outcome.record["provenance"]["kind"] != "reconstruction" or path is None or not path.is_file():
+        return Files({}, {"scenario_file": None})
+    return Files({path.name: path.read_bytes()}, {"scenario_file": path.name})
+
+
+FORMATS: Registry[Format] = Registry(
+    "output format",
+    {
+        "solution": solution_file,
+        "figures": figure_files,
+        "scenario": scenario_file,
+        "drawing": drawing_file,
+    },
+    error=OutputError,
+    group="repair.formats",
+)
+
+
+def register(name: str, written: Format) -> None:
+    """Add an output format of your own for this process; every result that is saved then has its files.
+
+    Raises
+    ------
+    OutputError
+        If the name is taken.
+    """
+    FORMATS.register(name, written)
+
+
+def saved(result: Saved, folder: Path) -> tuple[Outcome, list[Path]]:
+    """Write ``result.json`` and the files of every format into a folder, which is made if need be.
+
+    Files of an earlier run that have no successor are removed.
 
     Returns
     -------
-    dict
-        The content of ``result.json``, with the names of the other files.
+    Outcome
+        Its record names the files.
     list of Path
         What was written, ``result.json`` first.
 
@@ -48,26 +153,14 @@ def saved(result: RepairResult, folder: Path, *, figure: bool = True) -> tuple[d
     OutputError
         If the folder or a file in it cannot be written; nothing half-written is left.
     """
-    scene, content = result.prepared.scene, to_dict(result)
-    name = re.sub(r"[^\w.-]", "_", scene.id)[:100]
-    solution, figures = f"solution_{name}.xml", ("profiles.png", "birdseye.png")
+    record = dict(result.outcome.record)
     files: dict[str, bytes] = {}
-    if is_solved(result):
-        from commonroad.common.solution import CommonRoadSolutionWriter
-
-        content["solution_file"] = solution
-        files[solution] = CommonRoadSolutionWriter(to_solution(result)).dump().encode()
-    if figure:
-        from repair.report.birdseye import birdseye_figure
-        from repair.report.profiles import profile_figure
-        from repair.report.style import render
-
-        content["figure_files"] = list(figures)
-        for file, draw in zip(figures, (profile_figure, birdseye_figure), strict=True):
-            files[file] = render(draw(result))
-    if content["provenance"]["kind"] == "reconstruction" and scene.path is not None and scene.path.is_file():
-        content["scenario_file"] = scene.path.name
-        files[scene.path.name] = scene.path.read_bytes()
-    result_file = {"result.json": to_json(content).encode()}
-    stale = [file for file in (solution, *figures) if file not in files]
-    return content, write_files(folder, {**result_file, **files}, stale)
+    stale: list[str] = []
+    for _, written in FORMATS.items():
+        made = loaded(written)(result)
+        record.update(made.record)
+        files.update(made.files)
+        stale += made.stale
+    result_file = {RESULT_FILE: to_json(record).encode()}
+    gone = [name for name in stale if name not in files]
+    return replace(result.outcome, record=record), write_files(folder, {**result_file, **files}, gone)

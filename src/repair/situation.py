@@ -8,32 +8,45 @@ from typing import TYPE_CHECKING
 
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
-from repair.config import Config
 from repair.curves.base import Curve
 from repair.problem.factory import ProblemFactory
 from repair.problem.limits import Limits
+from repair.problem.settings import RepairConfig
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["Prepared"]
+__all__ = ["Situation"]
 
 
 @dataclass(frozen=True)
-class Prepared:
+class Situation:
     """Everything that is the same for every backend: made once, searched many times.
 
     Attributes
     ----------
+    scene : Scene
+        Road, traffic and ego.
+    settings : RepairConfig
+        What a repair problem is.
+    limits : Limits
+    occupancy : Occupancy
+        The traffic as inflated boxes along the scene's frame.
+    reference : Curve
+    checker : Checker
+    conflict : Conflict
+        Where the reference stops being drivable.
     t_reference : float
         Until when the reference is followed and judged [s].
     t_end : float
         End of the repairs [s].
+    notes : tuple of str
+        What had to be assumed.
     """
 
     scene: Scene
-    config: Config
+    settings: RepairConfig
     limits: Limits
     occupancy: Occupancy
     reference: Curve
@@ -42,11 +55,10 @@ class Prepared:
     t_reference: float
     t_end: float
     notes: tuple[str, ...]
-    phases: dict[str, float]
 
     @cached_property
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
         return ProblemFactory(
-            self.scene, self.config, self.limits, self.occupancy, self.reference, self.t_end
+            self.scene, self.settings, self.limits, self.occupancy, self.reference, self.t_end
         )

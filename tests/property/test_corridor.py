@@ -9,9 +9,10 @@ import pytest
 from tests.toy import DT, WIDE, box, problem
 
 from repair.arrays import frozen
-from repair.baselines.qptr import corridor
 from repair.baselines.qptr.backend import QptrBackend
+from repair.baselines.qptr.corridor import corridor_around
 from repair.baselines.qptr.settings import QptrConfig
+from repair.baselines.qptr.time_grid import time_grid
 from repair.curves.base import FrenetTrajectory
 from repair.problem.problem import Maneuver, Passing, Side
 from repair.reference.profile import SpeedProfile
@@ -99,10 +100,9 @@ def plain_piece(task, begin, end):
 @pytest.mark.parametrize("lateral", [False, True])
 @pytest.mark.parametrize("t_rep", [0.0, 0.33, 1.6])
 @pytest.mark.parametrize("seed", range(40))
-def test_all_pieces_at_once_are_the_pieces_one_by_one(seed, t_rep, lateral, monkeypatch):
-    monkeypatch.setattr(corridor, "_require_open", lambda *_: None)
+def test_all_pieces_at_once_are_the_pieces_one_by_one(seed, t_rep, lateral):
     task = scene(seed, lateral, t_rep)
-    made = corridor.build_corridor(task, corridor.time_grid(task, 7))
+    made = corridor_around(task, time_grid(task, 7))
     for i in range(7):
         t, s, low, high, sideways = plain_piece(task, made.edges[i], made.edges[i + 1])
         upper, room = plain_line(t, high, s)
@@ -114,7 +114,7 @@ def test_all_pieces_at_once_are_the_pieces_one_by_one(seed, t_rep, lateral, monk
         np.testing.assert_allclose(made.l[:, i], sideways, atol=1e-9)
 
 
-class _Swaying(SpeedProfile):
+class Swaying(SpeedProfile):
     """A reference that sways around the path."""
 
     def sample(self, t):
@@ -131,7 +131,7 @@ class _Swaying(SpeedProfile):
 
 
 def test_who_keeps_a_reference_that_sways_pays_for_its_jerk():
-    reference = _Swaying(frozen([0.0, 20.0]), frozen([0.0, 200.0]), frozen([10.0, 10.0]), frozen([0.0, 0.0]))
+    reference = Swaying(frozen([0.0, 20.0]), frozen([0.0, 200.0]), frozen([10.0, 10.0]), frozen([0.0, 0.0]))
     task = problem([], reference=reference, lateral=False)
     answer = QptrBackend(QptrConfig()).solve(task)
     times = np.linspace(0.0, 4.0, 4001)

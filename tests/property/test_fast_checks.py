@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repair.check.checker import Checker
+from repair.check.limits import exceeded_by_peaks, surely_kept
 from repair.check.peaks import peaks
 from repair.curves.plane import STANDSTILL, CartesianPath
 from repair.scene.frame import FrenetFrame, held_headings
 from repair.scene.traffic.obstacle import Obstacle
-from repair.vehicle import states as kinematics
+from repair.vehicle import transitions_fast
 from repair.vehicle.parameters import load_vehicle
 from repair.vehicle.single_track import body_angles, driven_states
 from repair.vehicle.transitions import direct_check, transition_errors
@@ -114,8 +115,8 @@ def test_a_box_around_several_poses_is_on_the_road_only_if_they_are(seed):
     rng = np.random.default_rng(seed)
     road = ragged_road(rng)
     x, y, heading = driven(rng, int(rng.integers(1, 90)), 3.0)
-    inside = road._inside(road._outline(x, y, heading))
-    assert inside[road._surely_inside(x, y, heading)].all()
+    inside = road.inside(road.outline(x, y, heading))
+    assert inside[road.surely_inside(x, y, heading)].all()
     first = road.first_off_road(x, y, heading)
     assert first == (None if inside.all() else int(np.argmin(inside)))
 
@@ -125,7 +126,7 @@ def test_most_poses_on_a_wide_road_are_settled_by_boxes():
     network = SimpleNamespace(lanelets=[lanelet(edge, edge * (1, -1))])
     road = RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
     x = np.linspace(0.0, 60.0, 161)
-    assert road._surely_inside(x, np.sin(x / 9.0), 0.1 * np.cos(x / 9.0)).all()
+    assert road.surely_inside(x, np.sin(x / 9.0), 0.1 * np.cos(x / 9.0)).all()
 
 
 def test_the_last_pose_fills_up_the_last_group():
@@ -158,7 +159,7 @@ def test_the_corridor_holds_only_what_is_on_the_road(seed):
     orientation = frame.heading(s) + rng.normal(0, rng.choice([0.0, 0.1, 1.0]), 400)
     s = s + rng.choice([0.0, 0.0, 1.0, 200.0], 400)  # a wrong cell may only say that it does not know
     held = corridor.holds(s, np.ascontiguousarray(xy).view(np.complex128)[:, 0], orientation)
-    assert road._inside(road._outline(*xy.T, orientation))[held].all()
+    assert road.inside(road.outline(*xy.T, orientation))[held].all()
 
 
 def test_the_corridor_holds_nearly_up_to_the_edge():
@@ -219,15 +220,14 @@ def crowd(rng, steps=20):
 def test_looking_at_blocks_drops_no_contact(seed):
     rng = np.random.default_rng(seed)
     substeps = int(rng.integers(1, 6))
-    shifts = {name: int(rng.integers(-3, 4)) for name in range(7)}
-    world = CollisionWorld(crowd(rng), EGO, 0.1, 20, substeps, shifts)
+    late = {name: int(rng.integers(-3, 4)) for name in range(7)}
+    late_crowd = [replace(one, late=late.get(one.id, 0)) for one in crowd(rng)]
+    world = CollisionWorld(late_crowd, EGO, 0.1, 20, substeps)
     start = int(rng.integers(0, world.n_samples))
     x, y, heading = driven(rng, int(rng.integers(1, world.n_samples - start + 1)))
     here = x + 1j * y
-    found = world._first(here, heading, start)
-    k, m = np.indices((len(x), len(world._kind))).reshape(2, -1)
-    world._near = lambda here, start, step: (k, (k + start) * len(world._kind) + m)
-    assert world._first(here, heading, start) == found
+    found = world.first_contact(here, heading, start)
+    assert world.first_contact(here, heading, start, all_pairs=True) == found
 
 
 # --------------------------------------------------------------------- limits
@@ -251,23 +251,19 @@ def test_what_is_well_within_the_limits_breaks_none(seed):
         a_lat=max(1e-3, share[3] * reached.max_lateral_acceleration),
         a_total=max(1e-3, share[4] * reached.max_total_acceleration),
     )
-    checker = Checker.__new__(Checker)
-    checker.limits = limits
-    if checker._well_within_limits(path, late):
-        checker._well_within_limits = lambda path, late: False
-        assert checker._limits(path, late, 0.0) == []
+    if surely_kept(path, late, limits):
+        assert exceeded_by_peaks(path, late, limits) == []
 
 
 def test_gentle_driving_is_well_within_the_limits():
     t = 0.025 * np.arange(80)
     path = CartesianPath.through(t, np.zeros(80) * 1j, 0.05 * t, 10.0 - t, 7.0)
-    checker = Checker.__new__(Checker)
-    checker.limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
-    assert checker._well_within_limits(path, 0)
-    assert checker._well_within_limits(path, 30)
+    limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
+    assert surely_kept(path, 0, limits)
+    assert surely_kept(path, 30, limits)
     for bad in (np.nan, 30.0):
         path.speed[40] = bad
-        assert not checker._well_within_limits(path, 30)
+        assert not surely_kept(path, 30, limits)
 
 
 # ----------------------------------------------------------------- kinematics
@@ -311,7 +307,7 @@ def test_the_bounds_of_clearly_drivable_hold_for_the_errors(errors, monkeypatch)
                 continue
             states = driven_states(np.arange(len(motion[0])) * 0.1, *motion, EGO)
             error = float(np.max(transition_errors(states, 0.1, EGO)[errors == "turn"]))
-            patch.setattr(kinematics, name, error / share * (1.0 - 1e-6))
+            patch.setattr(transitions_fast, name, error / share * (1.0 - 1e-6))
             asked += error > 1e-6
             assert error <= 1e-9 or not clearly_drivable(*motion, 0.1, EGO)
     assert asked > 100

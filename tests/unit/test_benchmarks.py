@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from benchmarks import measure, phases, table
+from benchmarks import machine, measure, phases, table
 
 
 @pytest.mark.parametrize("group", [phases.CHECKS, phases.LITERAL, *phases.SOLVING.values()])
@@ -18,8 +18,8 @@ def test_time_inside_a_phase_belongs_to_the_inner_one(monkeypatch: pytest.Monkey
     clock = iter(np.arange(0.0, 10.0, 1.0))
     monkeypatch.setattr(time, "process_time", lambda: next(clock))
     watch = phases.Stopwatch({})
-    inner = watch._wrapped("inner", lambda: None)
-    outer = watch._wrapped("outer", lambda: (inner(), inner()))
+    inner = watch.timed("inner", lambda: None)
+    outer = watch.timed("outer", lambda: (inner(), inner()))
     outer()
     assert watch.spent == {"inner": 2.0, "outer": 3.0}
 
@@ -52,9 +52,11 @@ def test_exponent() -> None:
     assert measure.exponent(x, 3.0 * x**1.5) == pytest.approx(1.5)
 
 
-def test_columns_are_aligned_and_empty_ones_left_out() -> None:
+def test_columns_are_aligned_and_empty_ones_left_out(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [
         measure.Row("g", name, "ms", measure.Spread.of([x])) for name, x in (("a", 1.0), ("longer", 123.4))
     ]
-    lines = table.aligned([table.HEAD, *(table._line(r) for r in rows)])
-    assert lines[1:] == ["a         1.00  ms", "longer     123  ms"]
+    table.print_report(measure.Report(rows), {**machine.describe(), "duration_s": 1.0})
+    *_, group, head, first, second = capsys.readouterr().out.splitlines()
+    assert (group, head.split()) == ("g", ["median"])
+    assert [first, second] == ["  a         1.00  ms", "  longer     123  ms"]

@@ -8,9 +8,9 @@ from scipy.sparse import csr_array
 
 from repair.arrays import frozen
 from repair.baselines.qptr.structure import qp_structure
-from repair.curves import bernstein
 from repair.curves.base import Curve
-from repair.curves.bernstein import BernsteinCurve, bernstein_basis
+from repair.curves.bernstein import BernsteinCurve, bernstein_basis, sampling_at
+from repair.curves.sampling import evaluated
 
 
 def chain(seed=0, pieces=4, degree=5):
@@ -55,18 +55,18 @@ def test_a_line_has_its_own_values_as_control_points():
     np.testing.assert_allclose(curve.sample(t).position[:, 0], 2.0 + 3.0 * t, atol=1e-12)
 
 
-def test_large_samplings_are_sparse_and_the_same(monkeypatch):
+def test_large_samplings_are_sparse_and_the_same():
     curve, t = chain(4, pieces=9), np.linspace(0.7, 6.0, 200)
-    sampled = []
-    for size, kind in ((0, csr_array), (10**9, np.ndarray)):
-        monkeypatch.setattr(bernstein, "DENSE", size)
-        bernstein._sampling_at.cache_clear()
-        assert isinstance(bernstein._sampling_at(t.tobytes(), 1.0, 9, 5, 0.5), kind)
-        sampled.append(curve.sample(t))
-    bernstein._sampling_at.cache_clear()
-    for name in ("position", "velocity", "acceleration", "jerk"):
-        one, other = (getattr(each, name) for each in sampled)
+    sparse, dense = (sampling_at(t.tobytes(), 1.0, 9, 5, 0.5, dense=size) for size in (0, 10**9))
+    assert isinstance(sparse, csr_array)
+    assert isinstance(dense, np.ndarray)
+    points = curve.points.reshape(-1, 2)
+    sampled, columns = curve.sample(t), zip(evaluated(sparse, points), evaluated(dense, points), strict=True)
+    for (one, other), name in zip(columns, ("position", "velocity", "acceleration", "jerk"), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
+        np.testing.assert_allclose(
+            getattr(sampled, name), other, rtol=1e-12, atol=1e-12 * np.abs(other).max()
+        )
 
 
 def test_beyond_the_span_the_end_speed_is_held():

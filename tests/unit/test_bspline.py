@@ -10,16 +10,17 @@ from benchmarks import literal
 from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 
-from repair.curves import bases as bspline
 from repair.curves.bases import (
     basis_matrix,
     bernstein_matrix,
     derivative_matrix,
     n_points_for,
     segment_matrix,
+    to_bernstein,
 )
-from repair.curves.bspline import UniformBSpline
+from repair.curves.bspline import UniformBSpline, sampling_at
 from repair.curves.fitting import fit_to_curve, splice_points
+from repair.curves.sampling import evaluated
 from repair.reference.profile import SpeedProfile
 
 DEGREES = (3, 4, 5)
@@ -193,21 +194,20 @@ def test_fit_of_a_parabola_is_the_parabola_up_to_the_last_control_point():
 
 
 @pytest.mark.parametrize("degree", DEGREES)
-def test_large_samplings_are_sparse_and_the_same(monkeypatch, degree):
+def test_large_samplings_are_sparse_and_the_same(degree):
     spline = random_spline(degree, seed=12, n=degree + 40)
     t = np.linspace(spline.t_start - 0.5, spline.t_end + 0.7, 333)
-    sampled = []
-    for size, kind in ((0, csr_array), (10**9, np.ndarray)):
-        monkeypatch.setattr(bspline, "DENSE", size)
-        bspline._sampling_at.cache_clear()
-        matrix = bspline._sampling_at(t.tobytes(), spline.t_start, len(spline.points), degree, spline.spacing)
-        assert isinstance(matrix, kind)
-        sampled.append(spline.sample(t))
-    bspline._sampling_at.cache_clear()
-    sparse, dense = sampled
-    for name in ("position", "velocity", "acceleration", "jerk"):
-        one, other = getattr(sparse, name), getattr(dense, name)
+    shape = (t.tobytes(), spline.t_start, len(spline.points), degree, spline.spacing)
+    sparse, dense = (sampling_at(*shape, dense=size) for size in (0, 10**9))
+    assert isinstance(sparse, csr_array)
+    assert isinstance(dense, np.ndarray)
+    columns = zip(evaluated(sparse, spline.points), evaluated(dense, spline.points), strict=True)
+    sampled = spline.sample(t)
+    for (one, other), name in zip(columns, ("position", "velocity", "acceleration", "jerk"), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
+        np.testing.assert_allclose(
+            getattr(sampled, name), other, rtol=1e-12, atol=1e-12 * np.abs(other).max()
+        )
 
 
 def test_beyond_both_ends_the_speed_of_the_end_is_held():
@@ -228,7 +228,7 @@ def test_the_end_of_the_span_belongs_to_the_last_segment():
 
 
 def test_cached_matrices_cannot_be_written():
-    for matrix in (segment_matrix(3), bernstein_matrix(3), derivative_matrix(7, 2, 0.4)):
+    for matrix in (segment_matrix(3), bernstein_matrix(3), to_bernstein(3), derivative_matrix(7, 2, 0.4)):
         with pytest.raises(ValueError, match="read-only"):
             matrix[0, 0] = 1.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import casadi
 import numpy as np
 import pytest
 from tests import toy
@@ -12,15 +13,19 @@ from tests.contract import problems
 from repair.arrays import frozen
 from repair.backend.base import SolveStatus
 from repair.curves.bspline import UniformBSpline
-from repair.problem.problem import Maneuver, Side
+from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, Maneuver, Side
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
-from repair.solvers.casadi import buffered as nlp_model
-from repair.solvers.casadi import instance as nlp_instance
 from repair.solvers.casadi.backend import CasadiBackend
-from repair.solvers.casadi.model import build_model
-from repair.solvers.casadi.separation import NOBODY, ROAD, Windows, road_room, separate
+from repair.solvers.casadi.buffered import Buffered
+from repair.solvers.casadi.instance import lay_out, limit_values, plane_acceleration
+from repair.solvers.casadi.model import Model, Solution, build_model
+from repair.solvers.casadi.residuals import residuals_of
+from repair.solvers.casadi.rows import RowKind
+from repair.solvers.casadi.separation import NOBODY, ROAD, SIDE_OF_BOUND, road_room, separate
 from repair.solvers.casadi.settings import CasadiConfig
+from repair.solvers.casadi.sides import open_sides
+from repair.solvers.casadi.windows import Windows
 
 INF = np.inf
 
@@ -43,6 +48,14 @@ def owners(found, side):
 
 
 # -- separation ------------------------------------------------------------------------------------
+
+
+def test_the_tables_of_the_sides_are_in_their_order():
+    tables = {side: (SIDE_AXIS[side], SIDE_SIGN[side]) for side in Side}
+    assert tables == {Side.BEHIND: (0, -1), Side.AHEAD: (0, 1), Side.LEFT: (1, 1), Side.RIGHT: (1, -1)}
+    assert {side for pair in SIDE_OF_BOUND for side in pair} == set(Side)
+    for axis, (lower, upper) in enumerate(SIDE_OF_BOUND):
+        assert (tables[lower], tables[upper]) == ((axis, 1), (axis, -1))
 
 
 def test_a_linear_edge_is_taken_over_exactly():
@@ -155,7 +168,7 @@ def test_accelerations_in_the_plane_are_those_of_the_driven_path():
     velocity = np.column_stack([6.0 + t, 1.5 * np.cos(t)])
     acceleration = np.column_stack([np.ones_like(t), -1.5 * np.sin(t)])
     states = np.stack([position, velocity, acceleration], axis=1)
-    along, across = nlp_instance.plane_acceleration(problem, states)
+    along, across = plane_acceleration(problem, states)
     xy = frame.to_cartesian(position[:, 0], position[:, 1])
     truth = np.gradient(np.gradient(xy, t, axis=0), t, axis=0)
     size = np.hypot(along, across)[5:-5]
@@ -183,13 +196,13 @@ def test_it_slows_down_for_a_bend(solver):
 
 def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_circle(monkeypatch):
     """With s alone SQP is not asked on a straight road; it is in a bend, and IPOPT always is."""
-    asked, solve = [], nlp_model.Model.solve
+    asked, solve = [], Model.solve
 
     def spy(self, *rest):
         asked.append(self.structure.solver)
         return solve(self, *rest)
 
-    monkeypatch.setattr(nlp_model.Model, "solve", spy)
+    monkeypatch.setattr(Model, "solve", spy)
     straight = problems.guided(toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(4.0, 0.0))], lateral=False))
     found = [CasadiBackend(CasadiConfig(solver=name)).solve(straight) for name in ("sqpmethod", "ipopt")]
     assert asked == ["ipopt"]
@@ -201,21 +214,47 @@ def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_ci
     assert "sqpmethod" in asked
 
 
+# -- rows ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lateral", [True, False])
+def test_every_row_is_bounded_by_what_its_kind_says(lateral):
+    """Against the limits themselves, row by row, with nothing given yet."""
+    problem = problems.static_block_left() if lateral else problems.static_block()
+    model = build_model(CasadiBackend().structure(problem))
+    low, high = limit_values(problem.limits)
+    limits, samples, linear = problem.limits, len(model.tau), model.linear_count
+    for rows, kept, place in zip(
+        model.linear, model.kept, np.cumsum([0, *map(len, model.kept)]), strict=False
+    ):
+        own = model.kind[place : place + len(kept)]
+        assert (own == rows.kind).all()
+        assert (RowKind(rows.kind) is RowKind.PLACE) == (rows.family == "obstacles")
+    circle = (0.995 * limits.a_total) ** 2
+    assert (high[model.kind[linear : linear + samples]] == circle).all()
+    assert (high[model.kind[linear + samples : linear + 2 * samples]] == limits.a_lat).all()
+    bounds = {"velocity": (limits.v_max, limits.v_lat), "acceleration": (limits.a_max, limits.a_lat)}
+    for rows in model.linear:
+        if rows.family in bounds:
+            assert high[rows.kind] == bounds[rows.family][rows.axis]
+    assert len(model.kind) == linear + samples * (6 if lateral else 2)
+    assert (low <= high).all()
+
+
 # -- statuses --------------------------------------------------------------------------------------
 
 
 def test_residuals_see_what_a_curve_breaks():
     backend, problem = CasadiBackend(), problems.static_block()
     result = backend.solve(problem)
-    model = build_model(backend._structure(problem, False))
-    instance, points = backend._instance(problem, model)
-    separation, _, why, _ = backend._open(instance, points)
+    instance, points = lay_out(problem, build_model(backend.structure(problem)))
+    separation, _, why, _ = open_sides(instance, points)
     assert why == ""
     moved = result.curve.points - instance.origin
-    assert max(instance.residuals(separation, moved).values()) <= 1e-6
+    assert max(residuals_of(instance, separation, moved).values()) <= 1e-6
     moved = moved.copy()
     moved[-3:, 0] += 30.0
-    broken = instance.residuals(separation, moved)
+    broken = residuals_of(instance, separation, moved)
     assert broken["obstacles"] > 10.0
     assert broken["jerk"] > 1.0
 
@@ -230,22 +269,26 @@ def test_the_model_is_built_once():
     assert again.status is SolveStatus.SOLVED
 
 
-def test_the_nlp_is_made_when_it_is_first_solved():
+def test_the_nlp_is_made_when_it_is_first_solved(monkeypatch):
     """Its time is building time, and what CasADi says against it then is a status too."""
     backend = CasadiBackend(CasadiConfig(solver="sqpmethod"), spacing=0.29)
     straight = toy.problem([], lateral=False, t_end=5.0)
-    model = build_model(backend._structure(straight, False))
+    model = build_model(backend.structure(straight))
     assert backend.solve(straight).status is SolveStatus.SOLVED
-    assert "_function" not in vars(model)
+    assert not model.compiled
     first, again = backend.solve(bend()), backend.solve(bend())
-    assert "_function" in vars(model)
+    assert model.compiled
     assert again.build_time < 0.5 * first.build_time
-    config = CasadiConfig(solver="sqpmethod", max_iterations=77)
-    model = build_model(CasadiBackend(config, spacing=0.29)._structure(straight, False))
-    model._compile = lambda: (_ for _ in ()).throw(RuntimeError("first line\nno licence"))
-    refused = CasadiBackend(config, spacing=0.29).solve(bend())
+
+    def refuse(*_):
+        raise RuntimeError("first line\nno licence")
+
+    monkeypatch.setattr(casadi, "nlpsol", refuse)
+    other = CasadiBackend(CasadiConfig(solver="sqpmethod", max_iterations=77), spacing=0.29)
+    refused = other.solve(bend())
     assert refused.status is SolveStatus.UNAVAILABLE
     assert "no licence" in refused.detail
+    assert not build_model(other.structure(bend())).compiled
 
 
 def test_iteration_limit():
@@ -268,27 +311,20 @@ def test_a_missing_plugin_is_a_status():
     "word", ["Restoration_Failed", "Invalid_Number_Detected", "Error_In_Step_Computation"]
 )
 def test_other_words_of_the_solver_are_numerical_errors(monkeypatch, word):
-    monkeypatch.setattr(
-        nlp_model.Model, "solve", lambda self, x0, *rest: nlp_model.Solution(x0, word, 3, 0.0)
-    )
+    monkeypatch.setattr(Model, "solve", lambda self, x0, *rest: Solution(x0, word, 3, 0.0))
     result = CasadiBackend().solve(problems.static_block())
     assert result.status is SolveStatus.NUMERICAL_ERROR
     assert word in result.detail
 
 
-def test_what_the_solver_throws_is_a_status():
+def test_what_the_solver_throws_is_a_status(monkeypatch):
     backend, problem = CasadiBackend(spacing=0.31), problems.static_block()
-    model = build_model(backend._structure(problem, False))
 
-    class Throws:
-        def __call__(self, **keys):
-            raise RuntimeError("first line\nthe plugin gave up")
+    def throws(**keys):
+        raise RuntimeError("first line\nthe plugin gave up")
 
-    kept, model._function = model._function, Throws()
-    try:
-        result = backend.solve(problem)
-    finally:
-        model._function = kept
+    monkeypatch.setattr(build_model(backend.structure(problem)), "nlp", throws)
+    result = backend.solve(problem)
     assert result.status is SolveStatus.NUMERICAL_ERROR
     assert "the plugin gave up" in result.detail
 
@@ -297,9 +333,9 @@ def test_claimed_but_not_kept_is_a_numerical_error(monkeypatch):
     """A solver that calls anything solved is not believed."""
 
     def lies(self, x0, *rest):
-        return nlp_model.Solution(x0 + np.linspace(0.0, 40.0, len(x0)), "Solve_Succeeded", 1, 0.0)
+        return Solution(x0 + np.linspace(0.0, 40.0, len(x0)), "Solve_Succeeded", 1, 0.0)
 
-    monkeypatch.setattr(nlp_model.Model, "solve", lies)
+    monkeypatch.setattr(Model, "solve", lies)
     result = CasadiBackend().solve(problems.static_block())
     assert result.status is SolveStatus.NUMERICAL_ERROR
     assert result.curve is None
@@ -317,18 +353,23 @@ def test_it_keeps_quiet(solver, capfd):
 
 
 @pytest.mark.parametrize("cause, expected", [(KeyboardInterrupt(), KeyboardInterrupt), (None, SystemError)])
-def test_an_interrupt_inside_casadi_is_an_interrupt(monkeypatch, cause, expected):
+def test_an_interrupt_inside_casadi_is_an_interrupt(cause, expected):
     """Python reports what was raised below CasADi's buffers as the cause of a SystemError."""
 
-    class Buffered(nlp_model._Buffered):
-        def __init__(self):
-            self._inputs = {}
+    class Function:
+        def buffer(self):
+            return None, self.evaluate
 
-        def _evaluate(self):
+        def evaluate(self):
             raise SystemError("returned a result with an exception set") from cause
 
+        def name_in(self):
+            return []
+
+        name_out = name_in
+
     with pytest.raises(expected):
-        Buffered()()
+        Buffered(Function())()
 
 
 def test_two_obstacles_without_a_gap_are_named():

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from repair.scene.traffic.late import steps_late
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import obstacles_of
 from repair.vehicle.parameters import load_vehicle
 from repair.world.collision import CollisionWorld
-from repair.world.late import official_shifts
 from repair.world.road import RoadBoundary
 from repair.world.touching import polygon_touches, rectangles_touch
 
@@ -176,9 +176,9 @@ def test_late_copies_for_the_drivability_checker():
     poses = tuple(a[9:] for a in at_rest())
     on_time = CollisionWorld([gone], EGO, 0.1, 10)
     assert first_collision(on_time, *poses, start=9) is None
-    late = CollisionWorld([gone], EGO, 0.1, 10, shifts={1: 1})
+    late = CollisionWorld([replace(gone, late=1)], EGO, 0.1, 10)
     assert first_collision(late, *poses, start=9) == (pytest.approx(0.3), 1)
-    static = CollisionWorld([replace(gone, role="static")], EGO, 0.1, 10, shifts={1: 1})
+    static = CollisionWorld([replace(gone, role="static")], EGO, 0.1, 10)  # of the same id, but on time
     assert first_collision(static, *poses, start=9) is None
 
 
@@ -191,16 +191,8 @@ def test_shifts_are_read_from_the_predictions():
 
     interval = SimpleNamespace(start=0, end=1)
     bare = SimpleNamespace(obstacle_id=9, prediction=None, initial_state=SimpleNamespace(time_step=0))
-    scenario = SimpleNamespace(
-        dynamic_obstacles=[
-            with_first(0, 0),
-            with_first(1, 1),
-            with_first(3, 3),
-            with_first(4, interval),
-            bare,
-        ]
-    )
-    assert official_shifts(scenario) == {0: 1, 3: -2}
+    obstacles = [with_first(0, 0), with_first(1, 1), with_first(3, 3), with_first(4, interval), bare]
+    assert [steps_late(obstacle) for obstacle in obstacles] == [1, 0, -2, 0, 0]
 
 
 @pytest.mark.parametrize(
@@ -306,7 +298,7 @@ def test_no_collision_of_the_drivability_checker_is_missed(scenarios):
     for path in samples_of(scenarios, 5):
         scenario, start = read(path)
         obstacles, _, _ = obstacles_of(scenario, first_step=start.time_step, n_steps=40)
-        world = CollisionWorld(obstacles, EGO, scenario.dt, 40, 4, official_shifts(scenario))
+        world = CollisionWorld(obstacles, EGO, scenario.dt, 40, 4)
         checker = create_collision_checker(scenario)
         centres = np.concatenate([o.states[:, :2] for o in obstacles])
         centres = centres[np.isfinite(centres).all(axis=1)]

@@ -19,8 +19,10 @@ from repair.curves.bases import n_points_for
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.problem.problem import Maneuver, Passing, Side
-from repair.solvers.ego import minimise, spline_cost
-from repair.solvers.ego import pairs as ego
+from repair.solvers.ego.backend import EgoBackend
+from repair.solvers.ego.cost_structure import SIZES, Sizes
+from repair.solvers.ego.minimise import Minimum, minimiser, newton
+from repair.solvers.ego.pairs import anchor_pairs
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
 
 # The paper's two stages and nothing else.
@@ -60,7 +62,7 @@ def swerving_reference(n=14, spacing=0.4):
 
 
 class Run(NamedTuple):
-    """The two costs that the backend made, the minima it took of them, and its result."""
+    """The two costs that the backend made, the minima it took of them (on both axes), and its result."""
 
     deformation: object
     refinement: object
@@ -69,19 +71,23 @@ class Run(NamedTuple):
     result: SolveResult
 
 
-def run(monkeypatch, problem, config=None, **keys):
-    made = []
-    minimise = ego.EgoBackend._minimise
+def run(problem, config=PLAIN, *, spacing=0.4, sizes=SIZES):
+    made, minimise = [], minimiser(config)
 
-    def spy(self, cost, *arguments, **keys):
-        made.append((cost, minimise(self, cost, *arguments, **keys)))
+    def spy(cost, deadline, **how):
+        made.append((cost, minimise(cost, deadline, **how)))
         return made[-1][1]
 
-    monkeypatch.setattr(ego.EgoBackend, "_minimise", spy)
-    result = ego.EgoBackend(config or PLAIN, **keys).solve(problem)
-    monkeypatch.undo()
-    (deformation, deformed), (refinement, refined) = made
-    return Run(deformation, refinement, deformed, refined, result)
+    result = EgoBackend(config, spacing=spacing, minimise=spy, sizes=sizes).solve(problem)
+    n = n_points_for(problem.t_end - problem.t_rep, spacing, 3)
+    initial = fit_to_curve(problem.reference, problem.t_rep, n, 3, spacing).points
+    costs, minima = zip(*made, strict=True)
+    return Run(*costs, *(Minimum(whole(points, initial), *rest) for points, *rest in minima), result)
+
+
+def whole(moved, initial):
+    """Control points on both axes, from those on the axes that move."""
+    return np.concatenate((moved, initial[:, moved.shape[1] :]), axis=1)
 
 
 CASES = [
@@ -95,9 +101,9 @@ CASES = [
 
 
 @pytest.mark.parametrize("side, lateral, t_end, spacing", CASES)
-def test_gradients_and_hessians_by_finite_differences(monkeypatch, side, lateral, t_end, spacing):
+def test_gradients_and_hessians_by_finite_differences(side, lateral, t_end, spacing):
     problem = make_problem(side, t_end=t_end, lateral=lateral)
-    made = run(monkeypatch, problem, replace(PLAIN, max_iterations=20), spacing=spacing)
+    made = run(problem, replace(PLAIN, max_iterations=20), spacing=spacing)
     rng = np.random.default_rng(0)
     for cost in (made.deformation, made.refinement):
         for metre in (0.05, 0.5, 5.0):  # the last one lies beyond all joints
@@ -118,28 +124,23 @@ def test_gradients_and_hessians_by_finite_differences(monkeypatch, side, lateral
 
 
 @pytest.mark.parametrize("side, lateral, t_end, spacing", CASES)
-def test_small_and_large_problems_are_evaluated_alike(monkeypatch, side, lateral, t_end, spacing):
+def test_small_and_large_problems_are_evaluated_alike(side, lateral, t_end, spacing):
     """One dense matrix below a size, the structure of the spline above it, sparse beyond another."""
     problem = make_problem(side, t_end=t_end, lateral=lateral, reference=swerving_reference(18))
     costs = []
-    for size, dense_points in ((10**9, 100), (0, 100), (0, 0)):
-        monkeypatch.setattr(spline_cost, "_DENSE", size)
-        monkeypatch.setattr(spline_cost, "_SPARSE", dense_points)
-        spline_cost._structure.cache_clear()
-        made = run(monkeypatch, problem, spacing=spacing)
+    for sizes in (Sizes(dense=10**9), Sizes(dense=0), Sizes(dense=0, sparse=0)):
+        made = run(problem, spacing=spacing, sizes=sizes)
         costs.append((made.deformation, made.refinement))
-    monkeypatch.undo()
-    spline_cost._structure.cache_clear()
     rng = np.random.default_rng(2)
     for dense, *others in zip(*costs, strict=True):
-        assert dense._matrix is not None
+        assert dense.structure.dense is not None
         for metre in (0.0, 0.3, 4.0):
             u = metre * rng.normal(size=dense.size)
             one = dense(u)
             room = 1e-6 + 1e-9 * np.abs(one.gradient).max()  # where terms cancel, their rounding stays
             for cost, kind in zip(others, (np.ndarray, csr_array), strict=True):
-                assert cost._matrix is None
-                assert isinstance(cost._structure.free, kind)
+                assert cost.structure.dense is None
+                assert isinstance(cost.structure.free, kind)
                 other = cost(u)
                 assert one.value == pytest.approx(other.value, rel=1e-9)
                 np.testing.assert_allclose(one.gradient, other.gradient, rtol=1e-9, atol=room)
@@ -164,12 +165,12 @@ class Shifted:
         return self.cost.points(self.begin + u)
 
 
-def test_newton_takes_no_step_from_the_minimum(monkeypatch):
-    cost = run(monkeypatch, make_problem(Side.BEHIND)).deformation
-    exact = minimise.newton(cost, 100, 1e-9)
+def test_newton_takes_no_step_from_the_minimum():
+    cost = run(make_problem(Side.BEHIND)).deformation
+    exact = newton(cost, 100, 1e-9)
     begin = (exact.points - cost.points(np.zeros(cost.size)))[cost.free].ravel()
     again = Shifted(cost, begin)
-    minimum = minimise.newton(again, 100, 1e-6)
+    minimum = newton(again, 100, 1e-6)
     assert again.evaluated == 1
     assert minimum.converged
     np.testing.assert_array_equal(minimum.points, cost.points(begin))
@@ -187,7 +188,7 @@ def from_band(band):
 
 
 @pytest.mark.parametrize("side, lateral, t_end, spacing", CASES)
-def test_costs_are_the_literal_ones(monkeypatch, side, lateral, t_end, spacing):
+def test_costs_are_the_literal_ones(side, lateral, t_end, spacing):
     problem = make_problem(side, t_end=t_end, lateral=lateral)
     config = replace(
         PLAIN,
@@ -197,7 +198,7 @@ def test_costs_are_the_literal_ones(monkeypatch, side, lateral, t_end, spacing):
         deform=DeformWeights(1.5, 20.0, 0.8),
         refine=RefineWeights(0.7, 3.0, 0.6),
     )
-    check_costs(problem, config, spacing, run(monkeypatch, problem, config, spacing=spacing))
+    check_costs(problem, config, spacing, run(problem, config, spacing=spacing))
 
 
 def check_costs(problem, config, spacing, made):
@@ -217,7 +218,7 @@ def check_costs(problem, config, spacing, made):
     for scale in (0.0, 0.3, 3.0):
         u = scale * rng.normal(size=(n - 3) * len(axes))
         value, gradient, _ = made.deformation(u)
-        points = whole(made.deformation.points(u), initial.points)
+        points = whole(made.deformation.points(u), initial.points).tolist()
         weights = config.deform
         expected, slope = literal.deformation_cost(
             points, pairs, spacing, bounds, weights.smooth, weights.collision, weights.feasible
@@ -230,7 +231,7 @@ def check_costs(problem, config, spacing, made):
         value, gradient, _ = made.refinement(u)
         weights = config.refine
         expected, slope = literal.refinement_cost(
-            whole(made.refinement.points(u), initial.points),
+            whole(made.refinement.points(u), initial.points).tolist(),
             deformed,
             3,
             spacing,
@@ -244,18 +245,13 @@ def check_costs(problem, config, spacing, made):
         np.testing.assert_allclose(gradient, free, rtol=1e-9, atol=1e-9 * np.abs(gradient).max() + 1e-6)
 
 
-def whole(moved, initial):
-    """Control points on both axes, from those on the axes that move."""
-    return np.concatenate((moved, initial[:, moved.shape[1] :]), axis=1).tolist()
-
-
 @pytest.mark.parametrize("side", SIDES)
 def test_pairs_are_the_literal_ones(side):
     boxes = (*BOXES, toy.box((5.0, 60.0), (-1.0, 1.0), present=(1.0, 2.0)))  # appears and disappears
     problem = make_problem(side, boxes=boxes, t_rep=0.3)
     n = n_points_for(3.7, 0.4, 3)
     shape = fit_to_curve(problem.reference, 0.3, n, 3, 0.4)
-    pairs = ego.anchor_pairs(problem, shape.greville, shape.points, 3)
+    pairs = anchor_pairs(problem, shape.greville, shape.points, 3)
     mine = {
         (int(i), int(axis), float(sign), round(float(anchor), 9), round(float(s_f), 9))
         for i, axis, sign, anchor, s_f in zip(*pairs, strict=True)
@@ -272,7 +268,7 @@ def test_pairs_are_the_literal_ones(side):
 def test_distance_is_that_of_definition_3():
     problem = make_problem(Side.BEHIND)
     shape = fit_to_curve(problem.reference, 0.0, 13, 3, 0.4)
-    pairs = ego.anchor_pairs(problem, shape.greville, shape.points, 3)
+    pairs = anchor_pairs(problem, shape.greville, shape.points, 3)
     distances = pairs.distance(shape.points)
     for k in range(len(pairs.row)):
         v = np.zeros(2)
@@ -285,11 +281,11 @@ def test_distance_is_that_of_definition_3():
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("lateral", [True, False])
 @pytest.mark.parametrize("solver", ["newton", "lbfgs"])
-def test_soft_optimum_is_the_exact_one(monkeypatch, side, lateral, solver):
+def test_soft_optimum_is_the_exact_one(side, lateral, solver):
     """Where the quadratic part is made round the Hessian is at least the identity, which bounds the gap."""
     problem = make_problem(side, lateral=lateral)
     config = replace(PLAIN, solver=solver, max_iterations=1000)
-    made = run(monkeypatch, problem, config)
+    made = run(problem, config)
     for cost, minimum in ((made.deformation, made.deformed), (made.refinement, made.refined)):
         exact = by_trust_region(cost)
         best = cost(exact).value
@@ -323,7 +319,7 @@ def test_both_minimisers_end_in_the_same_place(lateral, spacing):
     problem = make_problem(Side.BEHIND, lateral=lateral)
     config = replace(PLAIN, tolerance=1e-4, max_iterations=2000)
     results = [
-        ego.EgoBackend(replace(config, solver=name), spacing=spacing).solve(problem)
+        EgoBackend(replace(config, solver=name), spacing=spacing).solve(problem)
         for name in ("newton", "lbfgs")
     ]
     t = np.linspace(0.0, 4.0, 81)
@@ -335,7 +331,7 @@ def test_both_minimisers_end_in_the_same_place(lateral, spacing):
 
 
 def test_refined_start_and_end_are_those_of_the_deformation():
-    result = ego.EgoBackend(PLAIN).solve(make_problem(Side.LEFT))
+    result = EgoBackend(PLAIN).solve(make_problem(Side.LEFT))
     deformed, refined = result.stages["deformation"], result.stages["refinement"]
     np.testing.assert_array_equal(deformed.points[:3], refined.points[:3])
     np.testing.assert_array_equal(deformed.points[-3:], refined.points[-3:])
@@ -348,7 +344,7 @@ def test_refined_start_and_end_are_those_of_the_deformation():
 def test_repair_starts_in_the_state_of_the_reference(t_rep, degree):
     reference = swerving_reference(24)
     problem = make_problem(Side.BEHIND, t_rep=t_rep, reference=reference)
-    result = ego.EgoBackend(PLAIN, degree=degree, spacing=0.4).solve(problem)
+    result = EgoBackend(PLAIN, degree=degree, spacing=0.4).solve(problem)
     start, wanted = result.curve.sample(t_rep), reference.sample(t_rep)
     np.testing.assert_allclose(start.position, wanted.position, atol=1e-9)
     np.testing.assert_allclose(start.velocity, wanted.velocity, atol=1e-8)
@@ -357,7 +353,7 @@ def test_repair_starts_in_the_state_of_the_reference(t_rep, degree):
 
 def test_without_lateral_freedom_the_reference_stands_sideways():
     problem = make_problem(Side.BEHIND, lateral=False, reference=swerving_reference())
-    result = ego.EgoBackend(PLAIN).solve(problem)
+    result = EgoBackend(PLAIN).solve(problem)
     t = np.linspace(0.0, 4.0, 41)
     initial = fit_to_curve(problem.reference, 0.0, 13, 3, 0.4)
     np.testing.assert_allclose(
@@ -365,19 +361,19 @@ def test_without_lateral_freedom_the_reference_stands_sideways():
     )
 
 
-def test_costs_are_the_literal_ones_where_the_reference_swerves(monkeypatch):
+def test_costs_are_the_literal_ones_where_the_reference_swerves():
     problem = make_problem(Side.BEHIND, lateral=True, reference=swerving_reference())
-    check_costs(problem, PLAIN, 0.4, run(monkeypatch, problem))
+    check_costs(problem, PLAIN, 0.4, run(problem))
 
 
-def test_costs_include_what_stands_sideways(monkeypatch):
+def test_costs_include_what_stands_sideways():
     problem = make_problem(Side.BEHIND, lateral=False, reference=swerving_reference())
-    check_costs(problem, PLAIN, 0.4, run(monkeypatch, problem))
+    check_costs(problem, PLAIN, 0.4, run(problem))
 
 
 def test_free_road_keeps_a_straight_reference():
     bare = toy.problem(())
-    result = ego.EgoBackend().solve(bare)
+    result = EgoBackend().solve(bare)
     t = np.linspace(0.0, 4.0, 21)
     np.testing.assert_allclose(result.curve.sample(t).position[:, 0], 10.0 * t, atol=1e-3)
     assert result.status is SolveStatus.SOLVED
@@ -387,10 +383,10 @@ def test_free_road_keeps_a_straight_reference():
 def test_a_wall_is_kept_clear_of_and_rebounds_push_harder():
     boxes = (toy.box((25.0, 60.0), (-20.0, 20.0)),)
     problem = make_problem(Side.BEHIND, boxes=boxes, lateral=False)
-    soft = ego.EgoBackend(PLAIN).solve(problem)
+    soft = EgoBackend(PLAIN).solve(problem)
     config = replace(PLAIN, deform=DeformWeights(collision=0.001))
-    weak = ego.EgoBackend(config).solve(problem)
-    hard = ego.EgoBackend(replace(config, rebounds=6)).solve(problem)
+    weak = EgoBackend(config).solve(problem)
+    hard = EgoBackend(replace(config, rebounds=6)).solve(problem)
     end = [r.stages["deformation"].points[-1, 0] for r in (soft, weak, hard)]
     assert end[0] < 25.0
     assert end[1] > 25.0  # too soft: the control points collide
@@ -401,19 +397,19 @@ def test_a_wall_is_kept_clear_of_and_rebounds_push_harder():
 def test_braking_does_not_reverse():
     boxes = (toy.box((16.0, 60.0), (-20.0, 20.0)),)
     problem = make_problem(Side.BEHIND, boxes=boxes, lateral=False, t_end=6.0)
-    result = ego.EgoBackend(EgoConfig()).solve(problem)
+    result = EgoBackend(EgoConfig()).solve(problem)
     assert result.curve.sample(np.linspace(0.0, 6.0, 200)).velocity[:, 0].min() > -0.06
 
 
 def test_time_limit_gives_a_status_and_no_curve():
-    result = ego.EgoBackend(EgoConfig()).solve(make_problem(Side.LEFT), time_limit=0.0)
+    result = EgoBackend(EgoConfig()).solve(make_problem(Side.LEFT), time_limit=0.0)
     assert result.status is SolveStatus.TIME_LIMIT
     assert result.curve is None
     assert "0 s" in result.detail
 
 
 def test_iteration_limit_is_told():
-    result = ego.EgoBackend(replace(PLAIN, max_iterations=1)).solve(make_problem(Side.LEFT))
+    result = EgoBackend(replace(PLAIN, max_iterations=1)).solve(make_problem(Side.LEFT))
     assert result.status is SolveStatus.ITERATION_LIMIT
     assert result.curve is not None
 
@@ -421,7 +417,7 @@ def test_iteration_limit_is_told():
 def test_preconditioning_changes_the_path_and_not_the_goal():
     problem = make_problem(Side.LEFT)
     results = [
-        ego.EgoBackend(
+        EgoBackend(
             replace(PLAIN, solver="lbfgs", precondition=on, max_iterations=20_000, tolerance=1e-5)
         ).solve(problem)
         for on in (True, False)
@@ -434,7 +430,7 @@ def test_preconditioning_changes_the_path_and_not_the_goal():
 def test_solving_twice_gives_the_same_and_leaves_the_problem_alone():
     problem = make_problem(Side.RIGHT)
     before = (problem.start.copy(), problem.occupancy.lower.copy(), problem.passing.side.copy())
-    backend = ego.EgoBackend()
+    backend = EgoBackend()
     first, second = backend.solve(problem), backend.solve(problem)
     np.testing.assert_array_equal(first.curve.points, second.curve.points)
     np.testing.assert_array_equal(before[0], problem.start)
@@ -447,17 +443,17 @@ def test_solving_twice_gives_the_same_and_leaves_the_problem_alone():
 @pytest.mark.parametrize("duration", [0.1, 0.4, 0.9, 1.3])
 def test_short_repairs_have_a_result(duration):
     problem = make_problem(Side.BEHIND, t_rep=1.0, t_end=1.0 + duration)
-    result = ego.EgoBackend(spacing=0.4).solve(problem)
+    result = EgoBackend(spacing=0.4).solve(problem)
     assert result.curve is not None
     assert np.isfinite(result.curve.points).all()
     assert result.curve.t_end >= problem.t_end - 1e-9
 
 
-def test_literal_two_stages_end_where_the_backend_ends(monkeypatch):
+def test_literal_two_stages_end_where_the_backend_ends():
     problem = make_problem(Side.BEHIND, lateral=False)
     config = replace(PLAIN, max_iterations=5000, tolerance=1e-4)
     plain = literal.repair_once(problem, config, 3, 0.4)
-    made = run(monkeypatch, problem, config)
+    made = run(problem, config)
     np.testing.assert_allclose(plain.deformed, made.deformed.points, atol=0.02)
     np.testing.assert_allclose(plain.refined, made.refined.points, atol=0.02)
     assert plain.costs == pytest.approx((made.deformed.cost, made.refined.cost), rel=1e-3)
@@ -505,7 +501,7 @@ def test_literal_search_finds_the_same_f_ttr_in_scenario_1(scenarios):
 )
 def test_without_smoothness_there_is_still_a_finite_curve(solver, weights):
     config = replace(PLAIN, solver=solver, **weights)
-    result = ego.EgoBackend(config).solve(make_problem(Side.BEHIND, lateral=False))
+    result = EgoBackend(config).solve(make_problem(Side.BEHIND, lateral=False))
     assert result.curve is not None
     assert np.isfinite(result.curve.points).all()
     assert np.isfinite(result.objective)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -15,12 +16,13 @@ from repair.problem.factory import ProblemFactory
 from repair.problem.surroundings import surroundings
 from repair.problem.tables import Grid
 from repair.reference.profile import SpeedProfile
+from repair.vehicle.parameters import load_vehicle
 
 T_END = 4.0
 BRAKING = SpeedProfile.from_accelerations(0.0, 12.0, [1.0, 20.0], [0.0, -0.5])
 
 
-def factory(boxes, reference=BRAKING, t_end=T_END, lateral="road", tables=True):
+def factory(boxes, reference=BRAKING, t_end=T_END, lateral="road"):
     scene = SimpleNamespace(
         dt=toy.DT,
         start=np.array([[0.0, 0.0], [12.0, 0.0], [0.0, 0.0]]),
@@ -28,12 +30,18 @@ def factory(boxes, reference=BRAKING, t_end=T_END, lateral="road", tables=True):
         lane=toy.NARROW,
         same_direction=toy.NARROW,
         road=toy.WIDE,
+        vehicle=load_vehicle(1),
     )
     config = load_config(overrides=[f"repair.lateral={lateral}"])
-    made = ProblemFactory(scene, config, toy.LIMITS, toy.occupancy(*boxes), reference, t_end)
-    if not tables:
-        made.__dict__["_grid"] = None
-    return made
+    return ProblemFactory(scene, config.repair, toy.LIMITS, toy.occupancy(*boxes), reference, t_end)
+
+
+def general(boxes, t_rep, margin=None, **keys):
+    """The problems at ``t_rep`` without tables."""
+    with patch.object(Grid, "over", return_value=None) as over:
+        found = factory(boxes, **keys).at(t_rep, margin)
+    assert over.called == bool(found)
+    return found
 
 
 def same(one, other):
@@ -73,9 +81,9 @@ def boxes_of(rows):
 @given(ROWS, st.sampled_from(["road", "none"]), st.sampled_from([None, -0.5, 0.3]))
 def test_tables_and_general_path_make_the_same_problems(rows, lateral, margin):
     boxes = boxes_of(rows)
-    one, other = factory(boxes, lateral=lateral), factory(boxes, lateral=lateral, tables=False)
+    made = factory(boxes, lateral=lateral)
     for t_rep in (0.0, 0.4, 3 * 0.4, 2.05, 3.9, 4.0):
-        same(one.at(t_rep, margin), other.at(t_rep, margin))
+        same(made.at(t_rep, margin), general(boxes, t_rep, margin, lateral=lateral))
 
 
 @given(ROWS, st.integers(0, 39), st.floats(-1.0, 1.0))
@@ -117,6 +125,6 @@ def test_no_tables_where_the_end_is_off_the_grid_or_beyond_the_boxes(t_end, dura
 @pytest.mark.parametrize("t_end", [3.95, 4.0])
 def test_an_end_off_the_grid_is_no_error(t_end):
     ahead = [toy.box((30.0, 35.0), (-1.0, 1.0))]
-    one, other = factory(ahead, t_end=t_end), factory(ahead, t_end=t_end, tables=False)
-    assert one.at(0.4)
-    same(one.at(0.4), other.at(0.4))
+    found = factory(ahead, t_end=t_end).at(0.4)
+    assert found
+    same(found, general(ahead, 0.4, t_end=t_end))

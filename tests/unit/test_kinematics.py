@@ -16,6 +16,7 @@ from repair.vehicle.states import DrivenStates
 from repair.vehicle.transitions import LIMITS, direct_check
 
 ESCORT = load_vehicle(1)
+VEHICLES = pytest.mark.parametrize("vehicle", [load_vehicle(i) for i in (1, 2, 3, 4)], ids=lambda v: v.name)
 
 
 def along(curvature, speed, t, breaks=()):
@@ -46,7 +47,7 @@ def test_steady_circle_is_the_closed_form():
     assert states.speed == pytest.approx(4.0 * np.cos(slip), abs=1e-5)
 
 
-@pytest.mark.parametrize("vehicle", [load_vehicle(i) for i in (1, 2, 3, 4)], ids=lambda v: v.name)
+@VEHICLES
 def test_slip_follows_its_differential_equation_across_curvature_jumps(vehicle):
     def curvature(s):
         return 0.0 if s < 8 else (0.14 if s < 20 else -0.1)
@@ -116,6 +117,47 @@ def test_every_thins_out():
     assert len(states) == 3
     assert states.t == pytest.approx([0.0, 0.4, 0.8])
     assert states.x == pytest.approx([0.0, 2.0, 4.0])
+
+
+# -------------------------------------------------------- what the parameters say
+
+
+@VEHICLES
+def test_the_body_lies_around_its_reference_point(vehicle):
+    assert np.ptp(vehicle.corners, axis=0) == pytest.approx([vehicle.length, vehicle.width])
+    assert vehicle.corners.sum(axis=0).tolist() == [0.0, 0.0]
+    assert np.hypot(*vehicle.corners.T) == pytest.approx(vehicle.radius)
+    assert vehicle.corners[0].tolist() == [vehicle.half_length, vehicle.half_width]
+    following = np.roll(vehicle.corners, -1, axis=0)
+    assert (vehicle.corners[:, 0] * following[:, 1] > vehicle.corners[:, 1] * following[:, 0]).all()
+
+
+@VEHICLES
+@pytest.mark.parametrize("share", [0.5, 0.95])
+def test_the_sharpest_circle_takes_all_of_the_steering(vehicle, share):
+    t = np.arange(41) * 0.1
+    kappa = vehicle.largest_curvature(share)
+    assert vehicle.largest_curvature() > kappa
+    states = drive(*along(lambda s: kappa, np.full(41, 2.0), t), vehicle, slip0=vehicle.steady_slip(kappa))
+    assert states.steering == pytest.approx(share * vehicle.steering_max, rel=1e-3)
+    turning = np.diff(states.orientation) / 0.1
+    lateral = vehicle.lateral_acceleration(states.speed[:-1], states.steering[:-1])
+    assert lateral == pytest.approx(states.speed[:-1] * turning, rel=1e-3)
+
+
+@VEHICLES
+def test_the_engine_limits_the_acceleration_from_its_speed_on(vehicle):
+    speeds = vehicle.v_switch * np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 4.0])
+    expected = vehicle.a_max * np.array([1.0, 1.0, 1.0, 1.0, 0.5, 0.25])
+    assert vehicle.engine_acceleration(speeds) == pytest.approx(expected)
+    assert vehicle.engine_acceleration(speeds, 0.9) == pytest.approx(0.9 * expected)
+    assert replace(vehicle, v_switch=np.inf).engine_acceleration(30.0) == vehicle.a_max
+
+
+def test_the_sideways_jerk_is_that_of_turning_the_wheel():
+    step = 1e-6
+    after = ESCORT.lateral_acceleration(12.0, step * ESCORT.steering_rate_max)
+    assert ESCORT.lateral_jerk(12.0) == pytest.approx(float(after) / step)
 
 
 # ---------------------------------------------------------------- direct_check

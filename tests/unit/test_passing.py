@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from tests import toy
 
 from repair.arrays import frozen
-from repair.problem.lateral import _quintics, lateral_profiles
-from repair.problem.passing import _kinds, open_passings
+from repair.problem.lateral import lateral_profiles, quintics
+from repair.problem.passing import open_passings, possible_maneuvers
 from repair.problem.problem import Maneuver, Side
 from repair.problem.speeds import Bends, speed_profiles
 from repair.problem.surroundings import sides_of, surroundings
@@ -312,13 +312,13 @@ def test_a_lateral_motion_joins_its_ends_smoothly(l0, v0, a0, target, duration):
     tau = np.linspace(0.0, duration, 2001)
     start = np.array([l0, v0, a0])
     pair = np.array([target, -target]), np.array([duration, 1.5 * duration])
-    position, rate, acceleration = (values[0] for values in _quintics(start, *pair, tau))
+    position, rate, acceleration = (values[0] for values in quintics(start, *pair, tau))
     np.testing.assert_allclose((position[0], rate[0], acceleration[0]), start, atol=1e-9)
     np.testing.assert_allclose((position[-1], rate[-1], acceleration[-1]), (target, 0.0, 0.0), atol=1e-9)
     scale = 1.0 + np.abs(acceleration).max()
     np.testing.assert_allclose(np.gradient(position, tau)[1:-1], rate[1:-1], atol=1e-2 * scale)
     np.testing.assert_allclose(np.gradient(rate, tau)[1:-1], acceleration[1:-1], atol=1e-1 * scale)
-    later = _quintics(start, *pair, np.array([duration + 0.1, 2.0 * duration]))
+    later = quintics(start, *pair, np.array([duration + 0.1, 2.0 * duration]))
     np.testing.assert_allclose(later[0][0], target, atol=1e-9)
     assert not later[1][0].any()
     assert not later[2][0].any()
@@ -364,7 +364,7 @@ def test_who_gets_past_the_obstacle_in_conflict_goes_ahead(rows, v0, margin):
     start = np.array([reference.position[0], reference.velocity[0], reference.acceleration[0]])
     speeds = speed_profiles(start, reference.t, toy.LIMITS)
     (keep,) = lateral_profiles(start, reference.t, reference, met, toy.LIMITS, toy.WIDE, margin, False)
-    found = dict(_kinds(keep, met, speeds))
+    found = dict(possible_maneuvers(keep, met, speeds))
     passed = np.zeros(len(speeds.cost), dtype=bool)
     if met.conflict is not None:
         _, upper = cars.at(reference.t)

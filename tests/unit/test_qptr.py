@@ -8,11 +8,16 @@ from tests.contract import problems
 from tests.toy import box, constant, problem
 
 from repair.backend.base import SolveStatus
+from repair.baselines.qptr import backend as qptr
+from repair.baselines.qptr import qp
 from repair.baselines.qptr.backend import QptrBackend, make
-from repair.baselines.qptr.corridor import NoCorridor, build_corridor, time_grid
-from repair.baselines.qptr.qp import QpAnswer, infeasibility, solve_projection
+from repair.baselines.qptr.corridor import Corridor, NoCorridor, build_corridor, require_open
+from repair.baselines.qptr.qp import QpAnswer, infeasibility, proven_violation, solve_projection
+from repair.baselines.qptr.qp_residuals import RawAnswer
+from repair.baselines.qptr.qp_solvers import OSQP_TOLERANCES, SETTINGS, osqp_answer
 from repair.baselines.qptr.qp_trial import braking_problem, require_solver
 from repair.baselines.qptr.settings import QptrConfig
+from repair.baselines.qptr.time_grid import time_grid
 from repair.config import load_config
 from repair.curves.base import FrenetTrajectory
 from repair.errors import BackendError, ConfigError
@@ -108,6 +113,15 @@ def test_the_times_of_a_piece_lead_from_edge_to_edge():
         grid = time_grid(problem([], t_rep=t_rep, t_end=t_end), 7)
         np.testing.assert_allclose(grid.times[grid.index[:, 0]], grid.edges[:-1])
         np.testing.assert_allclose(grid.times[grid.index[:, -1]], grid.edges[1:])
+
+
+def test_a_corridor_is_open_or_refused():
+    """The start may lie in it or not; nothing else of the corridor is different."""
+    task = problem([], lateral=False)
+    corridor = corridor_of(task)
+    require_open(task, corridor)
+    with pytest.raises(NoCorridor, match="beyond the first trapezoid"):
+        require_open(task, Corridor(corridor.edges, corridor.s - 200.0, corridor.l))
 
 
 def test_corridor_without_obstacles_is_what_the_speed_limit_leaves():
@@ -206,8 +220,6 @@ def test_residuals_and_objective_are_those_of_the_curve():
 
 
 def test_residuals_tell_a_curve_that_breaks_the_limits(monkeypatch):
-    from repair.baselines.qptr import axis as qptr
-
     def claim(rows, *_):
         return QpAnswer(SolveStatus.SOLVED, np.full(rows.shape[1], 20.0), 0.0, "claimed")
 
@@ -256,26 +268,18 @@ def test_unknown_solver_names_those_there_are():
         QptrBackend(QptrConfig(solver="nosuch"))
 
 
-def test_solver_with_wrong_answers_is_refused_by_name(monkeypatch):
-    from repair.baselines.qptr import qp
-
+def test_solver_with_wrong_answers_is_refused_by_name():
     def broken(rows, *_):
-        return qp._Raw(np.zeros(rows.shape[1]), np.zeros(len(rows)), "solved")
+        return RawAnswer(np.zeros(rows.shape[1]), np.zeros(len(rows)), "solved")
 
-    monkeypatch.setattr(qp, "_call", broken)
-    qp._objection.cache_clear()
     with pytest.raises(BackendError, match=r"'daqp' is refused: .*braking problem"):
-        require_solver("daqp")
-    qp._objection.cache_clear()
+        require_solver("daqp", call=broken)
 
 
-def test_answer_is_judged_by_its_residuals_not_by_its_name(monkeypatch):
-    from repair.baselines.qptr import qp
-
+def test_answer_is_judged_by_its_residuals_not_by_its_name():
     rows, lower, upper = braking_problem(14.75)
-    claim = qp._Raw(np.full(18, 1e3), np.zeros(len(rows)), "solved")
-    monkeypatch.setattr(qp, "_call", lambda *_: claim)
-    answer = solve_projection(rows, lower, upper, "daqp")
+    claim = RawAnswer(np.full(18, 1e3), np.zeros(len(rows)), "solved")
+    answer = solve_projection(rows, lower, upper, "daqp", call=lambda *_: claim)
     assert answer.z is None
     assert answer.status is SolveStatus.NUMERICAL_ERROR
 
@@ -299,38 +303,34 @@ def test_infinite_bounds_bound_nothing_and_nothing_is_written_to(solver):
 
 @pytest.mark.parametrize("gap", [0.0, 5.0, 13.0, 13.7])
 def test_no_solution_is_proved_without_the_linear_program(gap, monkeypatch):
-    from repair.baselines.qptr import qp
-
     least = infeasibility(*braking_problem(gap))
-    assert 1e-5 < qp._proven_violation(*braking_problem(gap)) <= least + 1e-9
+    assert 1e-5 < proven_violation(*braking_problem(gap)) <= least + 1e-9
     monkeypatch.setattr(qp, "infeasibility", lambda *_: pytest.fail("not needed"))
     assert solve_projection(*braking_problem(gap), "daqp").status is SolveStatus.INFEASIBLE
 
 
 def test_linear_program_decides_where_there_is_no_proof(monkeypatch):
-    from repair.baselines.qptr import qp
+    def tired(*_):
+        return RawAnswer(None, None, "maximum iterations reached")
 
     monkeypatch.setattr(qp, "proven_violation", lambda *_: 0.0)
     assert solve_projection(*braking_problem(13.0), "daqp").status is SolveStatus.INFEASIBLE
-    monkeypatch.setattr(qp, "_call", lambda *_: qp._Raw(None, None, "maximum iterations reached"))
-    assert solve_projection(*braking_problem(14.75), "osqp").status is SolveStatus.ITERATION_LIMIT
+    answer = solve_projection(*braking_problem(14.75), "osqp", call=tired)
+    assert answer.status is SolveStatus.ITERATION_LIMIT
 
 
 @pytest.mark.parametrize("gap", [13.76, 13.85, 14.75, 100.0])
 def test_nothing_is_proved_against_a_problem_with_a_solution(gap):
-    from repair.baselines.qptr.qp import proven_violation
-
     assert proven_violation(*braking_problem(gap)) == 0.0
 
 
-def test_a_loose_osqp_answer_is_tightened(monkeypatch):
-    from repair.baselines.qptr import qp
+def test_a_loose_osqp_answer_is_tightened():
+    def loose(rows, lower, upper, *_):
+        return osqp_answer(rows, lower, upper, SETTINGS["osqp"] | {"polishing": False}, OSQP_TOLERANCES[:1])
 
     exact = solve_projection(*braking_problem(13.85), "daqp").z
     np.testing.assert_allclose(solve_projection(*braking_problem(13.85), "osqp").z, exact, atol=1e-4)
-    monkeypatch.setattr(qp, "_OSQP_TOLERANCES", qp._OSQP_TOLERANCES[:1])
-    monkeypatch.setitem(qp._SETTINGS["osqp"], "polishing", False)
-    assert solve_projection(*braking_problem(13.85), "osqp").z is None
+    assert solve_projection(*braking_problem(13.85), "osqp", call=loose).z is None
 
 
 def test_shortest_stop_of_the_braking_problem():

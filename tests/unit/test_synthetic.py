@@ -240,7 +240,7 @@ def test_a_straightforward_id(files, name):
 
 def test_same_bytes_every_time(files, tmp_path):
     """Also in another process, whose sets are ordered differently."""
-    code = "import sys\nfrom repair.scene.synthetic import *\n"
+    code = "import sys\nfrom repair.paper.synthetic import *\n"
     code += "for name in SCENARIOS: write_scenario(name, sys.argv[1])"
     environment = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Pacific/Kiritimati"}
     environment["PYTHONPATH"] = str(Path(synthetic.__file__).parents[2])

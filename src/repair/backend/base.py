@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
 from repair.curves.base import Curve
 from repair.problem.problem import RepairProblem
+from repair.problem.settings import RepairConfig
 
-__all__ = ["RepairBackend", "SolveResult", "SolveStatus"]
+__all__ = [
+    "BackendSpec",
+    "Capabilities",
+    "Closest",
+    "Configuration",
+    "RepairBackend",
+    "SolveResult",
+    "SolveStatus",
+]
 
 
 class SolveStatus(str, Enum):
@@ -39,6 +48,43 @@ class SolveStatus(str, Enum):
 
 
 @dataclass(frozen=True)
+class Capabilities:
+    """What a backend is able to do; the search asks nothing else about it.
+
+    Attributes
+    ----------
+    relaxes : bool
+        It keeps ``problem.margin`` whatever that costs. Where nothing is feasible, the search asks again
+        with the smaller margins of ``repair.relax``.
+    keeps_hull : bool
+        Its curves keep limits and margin at every time, by the hull of their control points, and the
+        residual ``obstacles`` says how far they are from it.
+    uses_warm_start : bool
+        A neighbouring curve is of use to it; others are handed none.
+    """
+
+    relaxes: bool = False
+    keeps_hull: bool = False
+    uses_warm_start: bool = False
+
+
+@dataclass(frozen=True)
+class Closest:
+    """The curve that comes closest where there is none that keeps the margin.
+
+    Attributes
+    ----------
+    curve : Curve
+        Keeps everything but the margin.
+    miss : float
+        By how much it misses the margin [m].
+    """
+
+    curve: Curve
+    miss: float
+
+
+@dataclass(frozen=True)
 class SolveResult:
     """What a backend found; it does not judge feasibility, the checker does.
 
@@ -57,8 +103,12 @@ class SolveResult:
         The solver's own word, or why there is no curve.
     residuals : mapping
         Largest violation of each constraint family, recomputed from the problem data (0: kept).
+        The names are the backend's own; whoever reads them may not rely on one being there.
     stages : mapping
         Intermediate curves by name (``deformation``, ``refinement``).
+    closest : Closest or None
+        With ``infeasible``: what the checker may accept all the same, because boxes in (s, l) are wider
+        than the vehicles in them.
     """
 
     status: SolveStatus
@@ -70,12 +120,22 @@ class SolveResult:
     detail: str = ""
     residuals: Mapping[str, float] = field(default_factory=dict)
     stages: Mapping[str, Curve] = field(default_factory=dict)
+    closest: Closest | None = None
 
 
 class RepairBackend(Protocol):
-    """The seam: a planner from a time-to-repair on. Never raises because a problem is infeasible."""
+    """The seam: a planner from a time-to-repair on. Never raises because a problem is infeasible.
+
+    Attributes
+    ----------
+    name : str
+        By which it is registered.
+    capabilities : Capabilities
+        What it is able to do.
+    """
 
     name: str
+    capabilities: Capabilities
 
     def solve(
         self,
@@ -86,3 +146,39 @@ class RepairBackend(Protocol):
     ) -> SolveResult:
         """Solve one repair; raises :class:`repair.errors.BackendError` for a malformed problem only."""
         ...
+
+
+class Configuration(Protocol):
+    """What a backend's factory sees of the configuration."""
+
+    @property
+    def repair(self) -> RepairConfig:
+        """The repair problem, the same for every backend."""
+        ...
+
+    def section(self, name: str) -> Any:
+        """The section of a backend: an instance of its settings' dataclass."""
+        ...
+
+
+@dataclass(frozen=True)
+class BackendSpec:
+    """A backend as it is registered: how it is made, and what may be set.
+
+    Attributes
+    ----------
+    factory : callable or str
+        Called with the :class:`Configuration`, gives a :class:`RepairBackend`; or ``"module:name"``.
+    settings : type or None
+        Dataclass of the backend's own section, with fields made by :func:`repair.settings.setting`. The
+        keys are ``<name of the backend>.<field>``.
+    needs : tuple of str
+        Packages without which it cannot be made.
+    says : str
+        One line for people.
+    """
+
+    factory: Callable[[Any], RepairBackend] | str
+    settings: type | None = None
+    needs: tuple[str, ...] = ()
+    says: str = "registered by the program"

@@ -105,10 +105,12 @@ def _figure(x: float) -> str:
 def at_most(
     name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE
 ) -> CertificateRow:
+    """A row whose value may not be above its limit."""
     return CertificateRow(name, value, limit, limit - value, value <= limit + tolerance, how, unit)
 
 
 def at_least(
     name: str, value: float, limit: float, how: str, unit: str, tolerance: float = TOLERANCE
 ) -> CertificateRow:
+    """A row whose value may not be below its limit."""
     return CertificateRow(name, value, limit, value - limit, value >= limit - tolerance, how, unit)

@@ -10,11 +10,12 @@ from repair.arrays import Array
 from repair.certify.certificate import SAMPLE, CertificateRow, at_least
 from repair.certify.hull import cut_pieces, pieces_of
 from repair.curves.bspline import UniformBSpline
+from repair.timegrid import steps_until
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
     from repair.curves.bernstein import BernsteinCurve
-    from repair.situation import Prepared
+    from repair.prepare import Prepared
 
 __all__ = ["allowed_depth", "clearance_rows"]
 
@@ -26,7 +27,12 @@ def allowed_depth(content: dict[str, Any], prepared: Prepared) -> float:
     most that hard ones are allowed to (``repair.relax``), and the true rectangles have a row of their own.
     """
     best = [p for p in content["probes"] if p["feasible"] and p["t_rep_s"] == content["f_ttr_s"]]
-    if best and "obstacles" in best[0]["residuals"] and best[0].get("margin_m") is not None:
+    said = content.get("capabilities")
+    # In results of earlier versions the hard backends are those with this residual.
+    hard = bool(best) and (
+        said.get("keeps_hull", False) if said else "obstacles" in best[0].get("residuals", {})
+    )
+    if hard and best[0].get("margin_m") is not None:
         return min(0.0, float(best[0]["margin_m"]))
     return min([0.0, *prepared.config.repair.relax])
 
@@ -46,7 +52,7 @@ def clearance_rows(
         return []
     t_end = min(t_end, curve.t_end)
     points, duration = pieces_of(curve)
-    steps = np.arange(np.ceil(curve.t_start / dt), np.floor(t_end / dt + 1e-6) + 1) * dt
+    steps = np.arange(np.ceil(curve.t_start / dt), steps_until(t_end, dt) + 1) * dt
     grid = np.linspace(curve.t_start, t_end, max(2, round((t_end - curve.t_start) / (2 * SAMPLE))) + 1)
     knots = curve.t_start + np.arange(len(points) + 1) * duration
     edges = np.unique(np.round(np.concatenate([steps, grid, knots[knots <= t_end]]), 10))

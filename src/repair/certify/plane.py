@@ -12,9 +12,10 @@ from repair.certify.certificate import SAMPLE, STATE_TOLERANCE, CertificateRow, 
 from repair.curves.base import Curve
 from repair.curves.codec import read_curve
 from repair.errors import RepairError
+from repair.timegrid import INSTANT, steps_until
 
 if TYPE_CHECKING:
-    from repair.situation import Prepared
+    from repair.prepare import Prepared
 
 __all__ = ["official_rows", "plane_rows"]
 
@@ -26,20 +27,16 @@ def plane_rows(prepared: Prepared, curve: Curve, t_rep: float, t_end: float) -> 
     """
     from repair.check.peaks import peaks
     from repair.curves.base import SplicedCurve
-    from repair.vehicle.single_track import drive
     from repair.world.collision import CollisionWorld
-    from repair.world.late import official_shifts
 
     scene, limits = prepared.scene, prepared.limits
     substeps = max(1, round(scene.dt / SAMPLE))
-    times = np.arange(int(np.floor(t_end / scene.dt + 1e-6)) * substeps + 1) * (scene.dt / substeps)
+    times = np.arange(steps_until(t_end, scene.dt) * substeps + 1) * (scene.dt / substeps)
     path = scene.frame.cartesian(SplicedCurve(prepared.reference, curve, t_rep).sample(times))
-    since = int(times.searchsorted(t_rep - 1e-9))
+    since = int(times.searchsorted(t_rep - INSTANT))
     reached = peaks(path, slice(since, None))
-    states = drive(path.t, path.xy, path.heading, path.speed, path.distance, scene.vehicle)
-    world = CollisionWorld(
-        scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, substeps, official_shifts(scene.scenario)
-    )
+    states = scene.model.drive(path)
+    world = CollisionWorld(scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, substeps)
     poses = states.x[since:], states.y[since:], states.orientation[since:]
     contact = world.contact(*poses, start=since)
     rows = [
@@ -66,10 +63,7 @@ def official_rows(folder: Path, content: Mapping[str, Any], prepared: Prepared) 
     if not file.is_file():
         raise RepairError(f"the solution file {file} is not there any more")
     scene = prepared.scene
-    own = () if scene.recorded_ego is None else (scene.recorded_ego.id,)
-    verdict = check_solution_file(
-        file, scene.scenario, PlanningProblemSet([scene.planning_problem]), without=own
-    )
+    verdict = check_solution_file(file, scene.official(), PlanningProblemSet([scene.planning_problem]))
     rows = [
         at_most(
             "solution file against the curve",

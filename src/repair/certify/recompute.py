@@ -10,7 +10,6 @@ CommonRoad drivability checker on the solution file.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,11 +20,12 @@ from repair.certify.hull import derivative_rows, seam_rows
 from repair.certify.plane import official_rows, plane_rows
 from repair.curves.codec import read_curve
 from repair.errors import RepairError
+from repair.io.result_json import read_record
 
 if TYPE_CHECKING:
-    from repair.situation import Prepared
+    from repair.prepare import Prepared
 
-__all__ = ["certify", "read_result"]
+__all__ = ["certify"]
 
 
 def certify(folder: Path) -> Certificate:
@@ -37,7 +37,7 @@ def certify(folder: Path) -> Certificate:
         If there is no result, no trajectory in it, or the scenario is not the one it was made from.
     """
     folder = Path(folder)
-    content = read_result(folder)
+    content = read_record(folder)
     status = str(content.get("status"))
     if content.get("solution_file") is None:
         raise RepairError(
@@ -67,22 +67,9 @@ def certify(folder: Path) -> Certificate:
 # -- reading -----------------------------------------------------------------------------------------
 
 
-def read_result(folder: Path) -> dict[str, Any]:
-    file = folder / "result.json"
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise RepairError(f"{folder} holds no result.json") from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise RepairError(f"{file} cannot be read: {error}") from error
-    if not isinstance(content, dict) or "status" not in content or "config" not in content:
-        raise RepairError(f"{file} is not the result of a repair")
-    return content
-
-
 def _prepare(folder: Path, content: Mapping[str, Any]) -> Prepared:
     """The scenario of the result, loaded and laid out again."""
-    from repair.config import load_config
+    from repair.config.load import recorded_config
     from repair.prepare import prepare
     from repair.scene.commonroad import load_scene
 
@@ -94,13 +81,8 @@ def _prepare(folder: Path, content: Mapping[str, Any]) -> Prepared:
     wanted = origin.get("sha256")
     if wanted and hashlib.sha256(path.read_bytes()).hexdigest() != wanted:
         raise RepairError(f"the scenario {path} is not the one the result was made from (checksum)")
-    settings = {key: value for key, value in content["config"].items() if key != "for_backend"}
-    config = load_config(overrides=settings)
-    scene = load_scene(
-        path,
-        planning_problem=origin.get("planning_problem_id"),
-        vehicle=config.scene.vehicle,
-        horizon=config.scene.horizon,
-        after_prediction=config.scene.after_prediction,
-    )
-    return prepare(scene, config)
+    settings = dict(content["config"])
+    # The planning problem that was taken, whatever was asked for.
+    settings["scene"] = {**settings.get("scene", {}), "planning_problem": origin.get("planning_problem_id")}
+    config = recorded_config(settings)
+    return prepare(load_scene(path, config), config)

@@ -12,21 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.arrays import Array, Points, frozen, largest, smallest
+from repair.arrays import Array, Points, frozen
+from repair.check.limits import exceeded
 from repair.check.peaks import Peaks, peaks
+from repair.check.registry import CHECKS, Driven
 from repair.check.settings import CheckerConfig
 from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
-from repair.vehicle.commonroad_ks import official_check
-from repair.vehicle.single_track import body_angles, drive, driven_states
+from repair.timegrid import INSTANT, steps_until
 from repair.vehicle.states import DrivenStates
-from repair.vehicle.transitions import direct_check
-from repair.vehicle.transitions_fast import clearly_drivable
 from repair.world.boxes import Occupancy
 from repair.world.collision import CollisionWorld, Contact
-from repair.world.late import official_shifts
 from repair.world.occupancy import first_entry
 from repair.world.road import RoadBoundary
 from repair.world.road_corridor import RoadCorridor
@@ -36,11 +34,6 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
 __all__ = ["Checker"]
-
-# Speeds this far below zero [m/s] still count as standing, and limits are met up to this share:
-# a soft backend ends near its limits, not on them.
-STANDSTILL = 0.05
-SLACK = 0.01
 
 
 @dataclass(frozen=True)
@@ -65,36 +58,31 @@ class Checker:
 
     def __init__(self, scene: Scene, limits: Limits, config: CheckerConfig) -> None:
         self.scene, self.limits, self.config = scene, limits, config
-        self.world = CollisionWorld(
-            scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps,
-            official_shifts(scene.scenario),
-        )  # fmt: skip
+        self.world = CollisionWorld(scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps)
         self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
         self._corridor = RoadCorridor(self.road, scene.frame, scene.vehicle) if self.road else None
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: _Followed | None = None
+        self._checks = [CHECKS[name] for name in config.extra]
 
     def times(self, t_end: float) -> Array:
         """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
-        steps = min(math.floor(t_end / self.scene.dt + 1e-6), self.scene.n_steps)
+        steps = min(steps_until(t_end, self.scene.dt), self.scene.n_steps)
         return self._times[: max(steps * self.config.substeps + 1, 0)]
 
-    def _path(self, curve: Curve, t_end: float) -> CartesianPath:
+    def path(self, curve: Curve, t_end: float) -> CartesianPath:
+        """The curve in the plane, densely sampled over [0, t_end]."""
         return self.scene.frame.cartesian(curve.sample(self.times(t_end)))
-
-    def _drive(self, path: CartesianPath, slip: float | None = None) -> DrivenStates:
-        vehicle = self.scene.vehicle
-        return drive(path.t, path.xy, path.heading, path.speed, path.distance, vehicle, slip0=slip)
 
     def drive(self, curve: Curve, t_end: float) -> DrivenStates:
         """Consistent vehicle states along the curve, densely sampled."""
-        return self._drive(self._path(curve, t_end))
+        return self.scene.model.drive(self.path(curve, t_end))
 
     def peaks(self, curve: Curve, t_end: float, t_from: float = 0.0) -> Peaks:
         """Extremes over [t_from, t_end]."""
-        path = self._path(curve, t_end)
-        return peaks(path, path.t >= t_from - 1e-9)
+        path = self.path(curve, t_end)
+        return peaks(path, path.t >= t_from - INSTANT)
 
     def contact(self, curve: Curve, t_end: float) -> Contact | None:
         """First contact of the true rectangles along the curve."""
@@ -113,17 +101,18 @@ class Checker:
 
         Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
         """
-        first = max(math.floor(problem.t_rep / self.scene.dt + 1e-6) - 1, 0) * self.config.substeps
+        first = max(steps_until(problem.t_rep, self.scene.dt) - 1, 0) * self.config.substeps
         times = self.times(problem.t_end)
-        after = curve.sample(times[times.searchsorted(problem.t_rep - 1e-9) :])
+        after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
         path, s, slip0 = self._spliced(problem, after, times, first)
         if not _finite(path):
             return _NOT_FINITE
-        slip, orientation = body_angles(path, self.scene.vehicle, slip0)
-        found = self._limits(path, len(path.t) - len(after), problem.t_rep) if self.config.limits else []
+        slip, orientation = self.scene.model.angles(path, slip0)
+        found = self._limits(path, len(path.t) - len(after), problem.t_rep)
         if self.config.margin:
             found += self._margin(problem, curve, after)
         found += self._clear(path, s, orientation, first)
+        found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
@@ -141,7 +130,7 @@ class Checker:
         times = self.times(t_end)
         motion = _motion(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
-        slip, orientation = body_angles(path, self.scene.vehicle)
+        slip, orientation = self.scene.model.angles(path)
         self._followed = _Followed(reference, t_end, motion, slip)
         return path, motion[0], slip, orientation
 
@@ -200,7 +189,7 @@ class Checker:
         if not self._enters(problem.occupancy, after):
             return []
         samples = self.times(problem.t_end)[:: self.config.substeps]
-        samples = samples[samples >= problem.t_rep - 1e-9]
+        samples = samples[samples >= problem.t_rep - INSTANT]
         entry = first_entry(problem.occupancy, curve.sample(samples))
         if entry is None:
             return []
@@ -231,71 +220,34 @@ class Checker:
         inside &= l < upper[..., 1]
         return bool(np.count_nonzero(inside))
 
-    def _well_within_limits(self, path: CartesianPath, late: int) -> bool:
-        """Whether bounds of the peaks, which cost less than the peaks, meet the limits already.
-
-        No difference quotient is beyond the largest change of one sample to the next.
-        """
-        limits, since = self.limits, max(late - 1, 0)
-        if len(path.t) - since < 2:
-            return False
-        speed = path.speed[since:]
-        change = speed[1:] - speed[:-1]
-        rate = 1.0 / float(path.t[1] - path.t[0])
-        v_high = largest(speed)
-        a_low, a_high = smallest(change), largest(change)
-        lateral = max(-path.slowest, v_high) * path.sharpest
-        return (
-            path.slowest >= -STANDSTILL
-            and v_high <= limits.v_max
-            and a_low * rate >= limits.a_min
-            and a_high * rate <= limits.a_max
-            and lateral * rate <= limits.a_lat
-            and math.hypot(max(-a_low, a_high), lateral) * rate <= limits.a_total
-        )
-
     def _limits(self, path: CartesianPath, late: int, t_rep: float) -> list[Violation]:
         """Limits that are broken from the path's sample ``late`` on."""
-        if self._well_within_limits(path, late):
-            return []
-        limits, reached, more = self.limits, peaks(path, slice(late, None)), 1 + SLACK
-        v_low, v_high = reached.min_speed, reached.max_speed
-        a_low, a_high = reached.min_acceleration, reached.max_acceleration
-        lateral, total = reached.max_lateral_acceleration, reached.max_total_acceleration
-        checks = (
-            (v_low < -STANDSTILL, "reverses at {:.2f} m/s", -v_low),
-            (v_high > limits.v_max * more + 0.1, "speed {:.1f} m/s", v_high),
-            (a_low < limits.a_min * more, "brakes at {:.2f} m/s²", a_low),
-            (a_high > limits.a_max * more, "accelerates at {:.2f}", a_high),
-            (lateral > limits.a_lat * more, "lateral acceleration {:.2f} m/s²", lateral),
-            (total > limits.a_total * more, "total acceleration {:.2f} m/s²", total),
-        )
-        broken = [text.format(value) for bad, text, value in checks if bad]
+        broken = exceeded(path, late, self.limits) if self.config.limits else []
         return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
 
     def _kinematics(
         self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
     ) -> list[Violation]:
-        """Direct check first; the drivability checker decides what is left before ``until``.
+        """What the vehicle cannot drive before ``until``.
 
         Judged are the scenario's steps of a path that begins at one.
         """
-        dt, vehicle, official, n = (
-            self.scene.dt, self.scene.vehicle, self.config.official, self.config.substeps,
-        )  # fmt: skip
-        xy, speed, slip, orientation = path.xy[::n], path.speed[::n], slip[::n], orientation[::n]
-        if len(xy) < 2:
+        n = self.config.substeps
+        columns = path.t[::n], path.xy[::n], path.speed[::n], slip[::n], orientation[::n]
+        if len(columns[0]) < 2:
             return []
-        if official != "always" and clearly_drivable(xy, speed, slip, orientation, dt, vehicle):
+        found = self.scene.model.first_undrivable(*columns, self.scene.dt, self.config.official, until)
+        return [] if found is None else [Violation(Reason.KINEMATICS, *found)]
+
+    def _extra(
+        self, problem: RepairProblem, path: CartesianPath, slip: Array, orientation: Array, late: int
+    ) -> list[Violation]:
+        """What the registered checks that are asked for say."""
+        if not self._checks:
             return []
-        states = driven_states(path.t[::n], xy, speed, slip, orientation, vehicle)
-        report = direct_check(states, dt, vehicle)
-        open_ = np.arange(len(report.ok)) if official == "always" else np.flatnonzero(~report.ok)
-        open_ = open_[states.t[open_] < until]
-        for k in open_.tolist():
-            if official == "never" or not official_check(states, dt, vehicle, [k]).ok.all():
-                return [Violation(Reason.KINEMATICS, float(states.t[k]), report.limit(k))]
-        return []
+        states = self.scene.model.states(path.t, path.xy, path.speed, slip, orientation)
+        driven = Driven(problem, path, states, late)
+        return [violation for check in self._checks for violation in check(driven)]
 
 
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))

@@ -9,6 +9,7 @@ import numpy as np
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict, Verdict
 from repair.curves.base import Curve
+from repair.timegrid import on_grid, steps_until
 from repair.world.boxes import Occupancy
 from repair.world.occupancy import first_entry
 
@@ -32,7 +33,7 @@ def detect_conflict(
         The checker's whole verdict on the reference.
     """
     dt = checker.scene.dt
-    steps = min(int(np.floor(t_end / dt + 1e-6)), checker.scene.n_steps)
+    steps = min(steps_until(t_end, dt), checker.scene.n_steps)
     sampled = reference.sample(np.arange(steps + 1) * dt)
     entry = first_entry(occupancy, sampled)
     verdict = checker.check_reference(reference, t_end)
@@ -41,7 +42,7 @@ def detect_conflict(
     if entry is not None:
         candidates.append((float(sampled.t[entry[0]]), 0, "margin", int(occupancy.ids[entry[1]])))
     for violation in verdict.violations:
-        at = float(np.floor(violation.time / dt + 1e-6) * dt)
+        at = on_grid(violation.time, dt)
         who = contact.obstacle_id if contact is not None and violation.reason.value == "collision" else None
         candidates.append((at, 1, violation.reason.value, who))
     touched = (contact.time, contact.obstacle_id, contact.from_behind) if contact is not None else None

@@ -11,19 +11,25 @@ from repair.errors import RepairError
 if TYPE_CHECKING:
     from repair.config import Config
 
-__all__ = ["SOURCES", "configuration_arguments", "resolve"]
+__all__ = ["UsageError", "configuration_arguments", "no_arguments", "reference_names", "resolve"]
 
-SOURCES = ("planner", "constant", "accelerate", "recorded")
+# For --help alone, which loads no registry; `repair config --table` lists what is registered too.
+_USUAL = "planner, constant, accelerate, recorded"
 
 
 class UsageError(RepairError):
     """The command line itself is wrong."""
 
 
-# -- run -------------------------------------------------------------------------------------------
+def reference_names() -> tuple[str, ...]:
+    """The sources of references that need no file."""
+    from repair.reference.registry import SOURCES
+
+    return tuple(name for name in SOURCES.names() if name != "file")
 
 
 def configuration_arguments(parser: argparse.ArgumentParser) -> None:
+    """``--backend``, ``--preset``, ``--config``, ``--set`` and ``--reference``."""
     parser.add_argument(
         "--backend", metavar="NAME", help="ego (default), casadi, qptr; see `repair backends`"
     )
@@ -35,12 +41,11 @@ def configuration_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", metavar="KEY=VALUE", action="extend", nargs="+", default=[], dest="overrides",
         help="configuration keys, such as search.delta_t=0.1; the last word",
     )  # fmt: skip
-    parser.add_argument(
-        "--reference", metavar="SOURCE", help=f"{', '.join(SOURCES)}, or a CommonRoad solution file"
-    )
+    parser.add_argument("--reference", metavar="SOURCE", help=f"{_USUAL}, or a CommonRoad solution file")
 
 
 def resolve(arguments: argparse.Namespace) -> Config:
+    """The configuration that these arguments make."""
     from repair.config import load_config
 
     overrides = [*_reference_overrides(arguments.reference), *arguments.overrides]
@@ -50,16 +55,13 @@ def resolve(arguments: argparse.Namespace) -> Config:
 def _reference_overrides(reference: str | None) -> list[str]:
     if reference is None:
         return []
-    if reference in SOURCES:
+    if reference in (known := reference_names()):
         return [f"reference.source={reference}"]
     if not Path(reference).is_file():
-        raise UsageError(f"reference {reference!r} is neither one of {', '.join(SOURCES)} nor a file")
+        raise UsageError(f"reference {reference!r} is neither one of {', '.join(known)} nor a file")
     # Quoted: a path may hold what YAML takes for something else.
     quoted = Path(reference).resolve().as_posix().replace("'", "''")
     return ["reference.source=file", f"reference.file='{quoted}'"]
-
-
-# -- the small verbs -------------------------------------------------------------------------------
 
 
 def no_arguments(parser: argparse.ArgumentParser) -> None:

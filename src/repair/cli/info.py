@@ -22,7 +22,7 @@ def backends(_: argparse.Namespace) -> int:
 
 def presets(_: argparse.Namespace) -> int:
     """Names and first words of the presets."""
-    from repair.config import preset_names
+    from repair.config.load import preset_names
     from repair.report.keys import preset_summary
 
     for name in preset_names():
@@ -45,9 +45,7 @@ def config(arguments: argparse.Namespace) -> int:
 
         print(key_table())
         return 0
-    from dataclasses import asdict
-
     import yaml
 
-    print(yaml.safe_dump(asdict(resolve(arguments)), sort_keys=False), end="")
+    print(yaml.safe_dump(resolve(arguments).to_dict(), sort_keys=False), end="")
     return 0

@@ -73,16 +73,16 @@ def run(arguments: argparse.Namespace) -> int:
     """One scenario; the result on stdout, and in files where a folder is given."""
     with _Interrupts() as interrupts, _scenario(arguments) as (path, config):
         from repair.api import repair
-        from repair.io.result_json import to_dict, to_json
+        from repair.io.result_json import to_json
         from repair.report.text import summary
-        from repair.save import saved
 
         result = repair(path, config)
-        content, problem = to_dict(result), None
+        content, problem = result.to_dict(), None
         written: list[Path] = []
         if arguments.out is not None:
             try:
-                content, written = saved(result, arguments.out, figure=not arguments.no_figure)
+                outcome, written = result.saved(arguments.out, figure=not arguments.no_figure)
+                content = outcome.record
             except RepairError as error:
                 problem = error
         if arguments.json:

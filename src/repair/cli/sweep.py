@@ -5,12 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from repair.cli.arguments import SOURCES
-
-if TYPE_CHECKING:
-    pass
+from repair.cli.arguments import UsageError, reference_names
 
 
 def sweep_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,8 +16,8 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
         "--backend", action="extend", nargs="+", metavar="NAME", help="one or more (default: ego)"
     )
     parser.add_argument(
-        "--reference", action="extend", nargs="+", choices=SOURCES, metavar="SOURCE",
-        help=f"one or more of {', '.join(SOURCES)} (default: planner)",
+        "--reference", action="extend", nargs="+", metavar="SOURCE",
+        help="one or more of planner, constant, accelerate, recorded (default: planner)",
     )  # fmt: skip
     parser.add_argument("--preset", metavar="NAME")
     parser.add_argument(
@@ -47,6 +43,9 @@ def sweep(arguments: argparse.Namespace) -> int:
     from repair.study.run import sweep as run_sweep
     from repair.study.store import write_sweep
 
+    for name in arguments.reference or []:
+        if name not in (known := reference_names()):
+            raise UsageError(f"reference {name!r} is none of {', '.join(known)}")
     settings = SweepSettings(
         backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"],
         preset=arguments.preset, overrides=arguments.overrides, official=not arguments.no_official,

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
-
-if TYPE_CHECKING:
-    pass
+from repair.timegrid import INSTANT
 
 __all__ = ["Curve", "FrenetTrajectory", "SplicedCurve"]
 
@@ -39,7 +37,7 @@ class FrenetTrajectory:
 
     def window(self, start: float, end: float) -> FrenetTrajectory:
         """The samples with ``start - 1e-9 <= t <= end + 1e-9``."""
-        keep = (self.t >= start - 1e-9) & (self.t <= end + 1e-9)
+        keep = (self.t >= start - INSTANT) & (self.t <= end + INSTANT)
         return FrenetTrajectory(
             self.t[keep], self.position[keep], self.velocity[keep],
             self.acceleration[keep], self.jerk[keep],
@@ -86,7 +84,7 @@ class SplicedCurve:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate either part."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        late = times >= self.t_rep - 1e-9
+        late = times >= self.t_rep - INSTANT
         parts = [c.sample(times[m]) for c, m in ((self.reference, ~late), (self.repaired, late)) if m.any()]
         if len(parts) == 1:
             return parts[0]

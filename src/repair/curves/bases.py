@@ -17,6 +17,7 @@ __all__ = [
     "local_basis",
     "n_points_for",
     "segment_matrix",
+    "to_bernstein",
 ]
 
 
@@ -37,16 +38,23 @@ def segment_matrix(degree: int) -> Array:
 
 
 @lru_cache(maxsize=16)
+def to_bernstein(degree: int) -> Array:
+    """Linear map (p+1, p+1) from the monomial coefficients of a polynomial on [0, 1] to its Bernstein points.
+
+    Point i is ``sum_k comb(i, k) / comb(p, k) a_k`` (Farouki, *The Bernstein polynomial basis: a
+    centennial retrospective*, 2012).
+    """
+    p = degree
+    return frozen([[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)])
+
+
+@lru_cache(maxsize=16)
 def bernstein_matrix(degree: int) -> Array:
     """Linear map (p+1, p+1) from a segment's B-spline control points to its Bernstein ones.
 
     Both sets span the same polynomial; the Bernstein hull is the tighter one.
     """
-    p = degree
-    to_bernstein = np.array(
-        [[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)]
-    )
-    return frozen(to_bernstein @ segment_matrix(p))
+    return frozen(to_bernstein(degree) @ segment_matrix(degree))
 
 
 @lru_cache(maxsize=64)

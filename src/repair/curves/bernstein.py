@@ -20,7 +20,7 @@ from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
 from repair.curves.sampling import DENSE, KEPT, evaluated, hold_ends
 
-__all__ = ["BernsteinCurve", "bernstein_basis", "derivative_map"]
+__all__ = ["BernsteinCurve", "bernstein_basis", "derivative_map", "sampling_at"]
 
 
 def bernstein_basis(u: npt.ArrayLike, degree: int) -> Array:
@@ -69,7 +69,7 @@ class BernsteinCurve:
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         pieces, width, _ = self.points.shape
         # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
-        made = _sampling_at if len(times) <= KEPT else _sampling_at.__wrapped__
+        made = sampling_at if len(times) <= KEPT else sampling_at.__wrapped__
         matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))
         position, velocity, acceleration, jerk = evaluated(matrix, self.points.reshape(pieces * width, 2))
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
@@ -89,11 +89,26 @@ def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Arra
 
 
 @lru_cache(maxsize=64)
-def _sampling_at(times: bytes, t_start: float, pieces: int, degree: int, duration: float) -> Any:
-    """The matrix for :func:`repair.curves.sampling.evaluated`; sparse where it is large."""
+def sampling_at(
+    times: bytes, t_start: float, pieces: int, degree: int, duration: float, *, dense: int = DENSE
+) -> Any:
+    """The matrix of a chain's samples for :func:`repair.curves.sampling.evaluated`; sparse where it is large.
+
+    Parameters
+    ----------
+    times : bytes
+        Of a (K,) array [s].
+    t_start : float
+        Start of the first piece [s].
+    pieces, degree : int
+    duration : float
+        Of each piece [s].
+    dense : int
+        Times * points up to which the matrix is a dense one.
+    """
     t_end = t_start + pieces * duration
     matrix = hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, pieces, degree, duration))
-    if matrix.size <= 4 * DENSE:
+    if matrix.size <= 4 * dense:
         return matrix
     from scipy.sparse import csr_array
 

@@ -1,4 +1,4 @@
-"""Uniform B-splines over time: evaluation, derivative control points, splicing, fitting.
+"""Uniform B-splines over time: evaluation, control points of derivatives, Bernstein points.
 
 The curve of degree p with control points Q_0 .. Q_{n-1} and knot spacing dt is
 Phi(t) = sum_i Q_i B_{i,p}(t) (paper, Sec. III-B; de Boor, *A Practical Guide to Splines*, ch. IX).
@@ -32,10 +32,27 @@ def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
 
 
 @lru_cache(maxsize=64)
-def sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Any:
-    """The matrix for :func:`evaluated`; sparse where it is large: any time sees p + 1 control points only."""
+def sampling_at(
+    times: bytes, t_start: float, n: int, degree: int, spacing: float, *, dense: int = DENSE
+) -> Any:
+    """The matrix of a spline's samples for :func:`repair.curves.sampling.evaluated`.
+
+    It is sparse where it is large: any time sees p + 1 control points only.
+
+    Parameters
+    ----------
+    times : bytes
+        Of a (K,) array [s].
+    t_start : float
+        Start of the span [s].
+    n, degree : int
+    spacing : float
+        Knot spacing [s].
+    dense : int
+        Times * points up to which the matrix is a dense one.
+    """
     t_end = t_start + (n - degree) * spacing
-    if len(times) // 8 * n <= DENSE:
+    if len(times) // 8 * n <= dense:
         return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
     from scipy.sparse import csr_array
 
@@ -54,6 +71,7 @@ def sampling_at(times: bytes, t_start: float, n: int, degree: int, spacing: floa
 
 @lru_cache(maxsize=64)
 def greville_offsets(n: int, degree: int, spacing: float) -> Array:
+    """Time (n,) since the start of the span at which each control point acts [s]."""
     return frozen((np.arange(n) - (degree - 1) / 2) * spacing)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +13,7 @@ from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
 from repair.errors import RepairError
 
-if TYPE_CHECKING:
-    from repair.curves.bernstein import BernsteinCurve
-
-__all__ = ["curve_to_dict"]
+__all__ = ["curve_to_dict", "read_curve"]
 
 
 def curve_to_dict(curve: Curve | None, t_end: float | None = None) -> dict[str, Any] | None:
@@ -56,15 +53,13 @@ def curve_to_dict(curve: Curve | None, t_end: float | None = None) -> dict[str, 
 
 
 def read_curve(content: Mapping[str, Any] | None) -> UniformBSpline | BernsteinCurve | None:
-    """The curve that :func:`repair.io.result_json.to_dict` wrote; None where it wrote none.
+    """The curve that :func:`curve_to_dict` wrote; None where it wrote none.
 
     Raises
     ------
     RepairError
         If it is given by samples only, or incomplete.
     """
-    from repair.curves.bernstein import BernsteinCurve
-
     if content is None:
         return None
     try:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from repair.arrays import Array, frozen
+from repair.timegrid import INSTANT
 
 __all__ = ["DENSE", "KEPT", "evaluated", "hold_ends"]
 
@@ -35,7 +36,7 @@ def hold_ends(times: bytes, t_start: float, t_end: float, values: Callable[[byte
     # The same offsets come back for other start times, up to rounding.
     matrix = values(np.round(tau, 12).tobytes())
     beyond = since - tau
-    out = np.flatnonzero(np.abs(beyond) > 1e-9)
+    out = np.flatnonzero(np.abs(beyond) > INSTANT)
     if not len(out):
         return matrix
     held = matrix.reshape(len(matrix), 4, len(tau)).copy()

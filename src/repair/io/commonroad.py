@@ -6,35 +6,35 @@ from typing import TYPE_CHECKING, Any
 
 from repair.errors import OutputError
 from repair.search.result import SearchStatus
+from repair.vehicle.parameters import VEHICLE_NAMES
 
 if TYPE_CHECKING:
-    from repair.api import RepairResult
+    from repair.scene.scene import Scene
+    from repair.vehicle.states import DrivenStates
 
-__all__ = ["is_solved", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
-
-
-# -- CommonRoad ------------------------------------------------------------------------------------
+__all__ = ["no_solution_because", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
 
 
-def to_trajectory(result: RepairResult) -> Any:
+def to_trajectory(scene: Scene, states: DrivenStates) -> Any:
     """What is driven, as a ``commonroad.scenario.trajectory.Trajectory`` of KS states.
 
-    The first state is at the planning problem's initial time step.
+    Parameters
+    ----------
+    scene : Scene
+    states : DrivenStates
+        At the scenario's steps; the first one is at the planning problem's initial time step.
     """
     from commonroad.scenario.trajectory import Trajectory
 
-    from repair.vehicle.commonroad_ks import to_ks_states
-
-    first = result.prepared.scene.initial_time_step
-    return Trajectory(initial_time_step=first, state_list=to_ks_states(result.states, first))
+    first = scene.initial_time_step
+    return Trajectory(initial_time_step=first, state_list=scene.model.to_commonroad(states, first))
 
 
-def to_dynamic_obstacle(result: RepairResult, obstacle_id: int | None = None) -> Any:
+def to_dynamic_obstacle(scene: Scene, states: DrivenStates, obstacle_id: int | None = None) -> Any:
     """The ego as a ``commonroad.scenario.obstacle.DynamicObstacle``.
 
     Parameters
     ----------
-    result : RepairResult
     obstacle_id : int, optional
         By default one that is free in the scenario.
     """
@@ -44,35 +44,44 @@ def to_dynamic_obstacle(result: RepairResult, obstacle_id: int | None = None) ->
     from commonroad.scenario.state import InitialState
     from commonroad.scenario.trajectory import Trajectory
 
-    scene = result.prepared.scene
-    states = to_trajectory(result).state_list
+    driven = to_trajectory(scene, states).state_list
     if obstacle_id is None:
         obstacle_id = scene.scenario.generate_object_id()
         while obstacle_id == scene.planning_problem_id:
             obstacle_id = scene.scenario.generate_object_id()
     shape = Rectangle(length=scene.vehicle.length, width=scene.vehicle.width)
     first = InitialState(
-        time_step=states[0].time_step,
-        position=states[0].position,
-        orientation=states[0].orientation,
-        velocity=states[0].velocity,
+        time_step=driven[0].time_step,
+        position=driven[0].position,
+        orientation=driven[0].orientation,
+        velocity=driven[0].velocity,
         acceleration=scene.initial_state.acceleration,
         yaw_rate=scene.initial_state.yaw_rate,
         slip_angle=0.0,
     )
     # CommonRoad's predictions begin one step after the initial state; its collision checker relies on it.
-    rest = states[1:]
+    rest = driven[1:]
     prediction = TrajectoryPrediction(Trajectory(rest[0].time_step, rest), shape) if rest else None
     return DynamicObstacle(obstacle_id, ObstacleType.CAR, shape, first, prediction)
 
 
-def to_solution(result: RepairResult) -> Any:
+def no_solution_because(scene: Scene, status: SearchStatus) -> str:
+    """Why there is no solution to write; empty where there is one."""
+    if status not in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
+        return status.sentence
+    if scene.vehicle.type_id not in VEHICLE_NAMES:
+        return f"vehicle {scene.settings.vehicle!r} is none of CommonRoad's, which a solution has to name"
+    return ""
+
+
+def to_solution(scene: Scene, states: DrivenStates, status: SearchStatus) -> Any:
     """What is driven, as a ``commonroad.common.solution.Solution`` (KS model, cost function JB1).
 
     Raises
     ------
     OutputError
-        If there is no verified trajectory: a colliding one is never handed out as a solution.
+        If there is no verified trajectory (a colliding one is never handed out as a solution), or the
+        vehicle is none of CommonRoad's.
     """
     from commonroad.common.solution import (
         CostFunction,
@@ -82,19 +91,14 @@ def to_solution(result: RepairResult) -> Any:
         VehicleType,
     )
 
-    if not is_solved(result):
-        raise OutputError(f"there is no solution to write: {result.status.sentence}")
-    scene = result.prepared.scene
+    if why := no_solution_because(scene, status):
+        raise OutputError(f"there is no solution to write: {why}")
     problem = PlanningProblemSolution(
         planning_problem_id=scene.planning_problem_id,
         vehicle_model=VehicleModel.KS,
         vehicle_type=VehicleType(scene.vehicle.type_id),
         cost_function=CostFunction.JB1,
-        trajectory=to_trajectory(result),
+        trajectory=to_trajectory(scene, states),
     )
     # Without a date and a computation time the same input gives the same file.
     return Solution(scene.scenario.scenario_id, [problem], date=None)
-
-
-def is_solved(result: RepairResult) -> bool:
-    return result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT)

@@ -7,7 +7,6 @@ sweeps and certificates do.
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,19 +42,15 @@ class OfficialVerdict:
         return self.feasible and self.collision_free and self.on_road
 
 
-def check_solution_file(
-    file: Path, scenario: Any, planning_problems: Any, without: tuple[int, ...] = ()
-) -> OfficialVerdict:
+def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> OfficialVerdict:
     """Read a CommonRoad solution file and have it checked.
 
     Parameters
     ----------
     file : Path
     scenario : commonroad.scenario.scenario.Scenario
-        Not changed.
+        With the traffic that counts (:meth:`repair.scene.scene.Scene.official`).
     planning_problems : commonroad.planning.planning_problem.PlanningProblemSet
-    without : tuple of int
-        Obstacles to leave out: recordings of the ego itself, with which every solution would collide.
 
     Raises
     ------
@@ -67,9 +62,6 @@ def check_solution_file(
     from repair.scene.reading import read_solution
 
     solution = read_solution(file)
-    scenario = deepcopy(scenario)
-    for obstacle in [o for o in scenario.dynamic_obstacles if o.obstacle_id in without]:
-        scenario.remove_obstacle(obstacle)
     try:
         answers = solution_checker.solution_feasible(solution, scenario.dt, planning_problems)
         feasible = all(bool(answer[0]) for answer in answers.values())

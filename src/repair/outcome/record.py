@@ -1,28 +1,28 @@
-"""The content of ``result.json``."""
+"""The record of a result: plain values in a fixed order, as ``result.json`` holds them."""
 
 from __future__ import annotations
 
-import json
 import platform
-import re
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from repair.arrays import column, number
-from repair.backend.base import SolveResult
-from repair.curves.base import SplicedCurve
+from repair.backend.base import Capabilities, SolveResult
+from repair.check.peaks import Peaks
+from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
+from repair.metrics.base import MetricValue
+from repair.prepare import Prepared
+from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
-from repair.search.result import Probe
+from repair.search.result import Probe, SearchResult
+from repair.vehicle.states import DrivenStates
 
-if TYPE_CHECKING:
-    from repair.api import RepairResult
-    from repair.check.peaks import Peaks
-
-__all__ = ["peaks_to_dict", "probe_peaks", "to_dict", "to_json"]
+__all__ = ["driven_curve", "peaks_to_dict", "probe_peaks", "record_of"]
 
 _PACKAGES = (
     "commonroad-repair", "numpy", "scipy", "casadi", "qpsolvers", "osqp", "daqp", "clarabel", "shapely",
@@ -30,13 +30,33 @@ _PACKAGES = (
 )  # fmt: skip
 
 
-# -- JSON ------------------------------------------------------------------------------------------
+def record_of(
+    prepared: Prepared,
+    found: SearchResult,
+    states: DrivenStates,
+    peaks: Peaks | None,
+    phases: Mapping[str, float],
+    metrics: Mapping[str, MetricValue],
+    capabilities: Capabilities,
+) -> dict[str, Any]:
+    """Plain Python values, in a fixed order, no NaN and no infinity.
 
-
-def to_dict(result: RepairResult) -> dict[str, Any]:
-    """The content of ``result.json``: plain Python values, in a fixed order, no NaN and no infinity."""
-    found, prepared = result.search, result.prepared
-    conflict, scene, peaks = found.conflict, prepared.scene, result.peaks
+    Parameters
+    ----------
+    prepared : Prepared
+    found : SearchResult
+    states : DrivenStates
+        What is driven, at the scenario's steps.
+    peaks : Peaks or None
+        Extremes of the repaired part.
+    phases : mapping
+        Wall time by phase [s].
+    metrics : mapping
+        Those that were asked for.
+    capabilities : Capabilities
+        Of the backend.
+    """
+    conflict, scene = found.conflict, prepared.scene
     best = found.best
     return {
         "schema": 1,
@@ -57,29 +77,25 @@ def to_dict(result: RepairResult) -> dict[str, Any]:
             "contact_t_s": number(conflict.contact_time),
             "from_behind": conflict.from_behind,
         },
+        "metrics": {name: _metric(value) for name, value in metrics.items()},
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,
         **peaks_to_dict(peaks),
-        "probes": [_probe(result, p) for p in found.probes],
+        "probes": [_probe(prepared, p) for p in found.probes],
         "curve": curve_to_dict(found.curve),
         "reference": curve_to_dict(prepared.reference, prepared.t_reference),
         "t_end_s": number(prepared.t_end),
-        "trajectory": _trajectory(result),
-        "limits": _limits(result),
+        "trajectory": _trajectory(prepared, found, states),
+        "limits": _limits(prepared.limits),
+        "capabilities": asdict(capabilities),
         "notes": list(prepared.notes),
         "solution_file": None,
         "figure_files": [],
         "scenario_file": None,
-        "time_s": {name: number(seconds, 6) for name, seconds in result.phases.items()},
-        "config": asdict(prepared.config),
+        "drawing_file": None,
+        "time_s": {name: number(seconds, 6) for name, seconds in phases.items()},
+        "config": prepared.config.to_dict(),
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
     }
-
-
-def to_json(content: dict[str, Any]) -> str:
-    """Strict JSON text, one key a line, number lists on one line."""
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    flat = re.compile(r"\[\s+((?:-?[\d.eE+-]+|null)(?:,\s+(?:-?[\d.eE+-]+|null))*)\s+\]")
-    return flat.sub(lambda m: "[" + re.sub(r"\s+", " ", m.group(1)) + "]", text) + "\n"
 
 
 def _version(name: str) -> str | None:
@@ -90,6 +106,7 @@ def _version(name: str) -> str | None:
 
 
 def peaks_to_dict(peaks: Peaks | None) -> dict[str, float | None]:
+    """Extremes with their units in the keys."""
     return {
         "peak_deceleration_mps2": number(peaks.min_acceleration) if peaks else None,
         "peak_acceleration_mps2": number(peaks.max_acceleration) if peaks else None,
@@ -100,16 +117,15 @@ def peaks_to_dict(peaks: Peaks | None) -> dict[str, float | None]:
     }
 
 
-def probe_peaks(result: RepairResult, probe: Probe) -> Peaks | None:
+def probe_peaks(prepared: Prepared, probe: Probe) -> Peaks | None:
     """Extremes of the repaired part of a probe; None where the solver left no curve."""
     if probe.solve.curve is None:
         return None
-    prepared = result.prepared
     spliced = SplicedCurve(prepared.reference, probe.solve.curve, probe.t_rep)
     return prepared.checker.peaks(spliced, prepared.t_end, probe.t_rep)
 
 
-def _probe(result: RepairResult, probe: Probe) -> dict[str, Any]:
+def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
     solve: SolveResult = probe.solve
     return {
         "t_rep_s": number(probe.t_rep),
@@ -126,7 +142,7 @@ def _probe(result: RepairResult, probe: Probe) -> dict[str, Any]:
         "solver_detail": solve.detail,
         "iterations": solve.iterations,
         "objective": number(solve.objective),
-        **peaks_to_dict(probe_peaks(result, probe)),
+        **peaks_to_dict(probe_peaks(prepared, probe)),
         "residuals": {name: number(value, 12) for name, value in solve.residuals.items()},
         "build_time_s": number(solve.build_time),
         "solve_time_s": number(solve.solve_time),
@@ -134,14 +150,24 @@ def _probe(result: RepairResult, probe: Probe) -> dict[str, Any]:
     }
 
 
-def _trajectory(result: RepairResult) -> dict[str, Any]:
+def _metric(metric: MetricValue) -> dict[str, Any]:
+    return {f"value_{metric.unit}": number(metric.value), "status": metric.status}
+
+
+def driven_curve(prepared: Prepared, found: SearchResult) -> Curve:
+    """What is driven, in the Frenet frame; the reference where there is no repair."""
+    if found.curve is None:
+        return prepared.reference
+    return SplicedCurve(prepared.reference, found.curve, float(found.f_ttr or 0.0))
+
+
+def _trajectory(prepared: Prepared, found: SearchResult, states: DrivenStates) -> dict[str, Any]:
     """What is driven, at the scenario's steps; centre of the vehicle, speed at the rear axle."""
-    states = result.states
-    along = result.curve.sample(states.t)
+    along = driven_curve(prepared, found).sample(states.t)
     wrapped = np.arctan2(np.sin(states.orientation), np.cos(states.orientation))
     return {
-        "initial_time_step": result.prepared.scene.initial_time_step,
-        "dt_s": number(result.prepared.scene.dt),
+        "initial_time_step": prepared.scene.initial_time_step,
+        "dt_s": number(prepared.scene.dt),
         "t_s": column(states.t),
         "x_m": column(states.x),
         "y_m": column(states.y),
@@ -153,8 +179,7 @@ def _trajectory(result: RepairResult) -> dict[str, Any]:
     }
 
 
-def _limits(result: RepairResult) -> dict[str, float | None]:
-    limits = result.prepared.limits
+def _limits(limits: Limits) -> dict[str, float | None]:
     units = {"v": "mps", "a": "mps2", "j": "mps3"}
     return {
         f"{name}_{units.get(name.split('_')[0], 'per_m')}": number(value)

@@ -39,17 +39,11 @@ def paper_scenes(scenario_dir: Path | str | None, numbers: Sequence[int]) -> dic
     scenes = {}
     for number in numbers:
         name = f"scenario_{number}"
-        config = load_config(preset=name).scene
+        config = load_config(preset=name)
         given = Path(scenario_dir or ".", OFFICIAL_FILES.get(name, ""))
         known = scenario_dir is not None and given.is_file()
         with nullcontext(given) if known else paper_scenario(name) as path:
-            scenes[number] = load_scene(
-                path,
-                planning_problem=config.planning_problem,
-                vehicle=config.vehicle,
-                horizon=config.horizon,
-                after_prediction=config.after_prediction,
-            )
+            scenes[number] = load_scene(path, config)
     return scenes
 
 

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from repair.report.birdseye import birdseye_figure
 from repair.report.profiles import profile_figure, stages_figure
 from repair.report.style import render
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["paper_figures"]
 
@@ -32,7 +27,7 @@ def paper_figures(backend: str = "ego", file_format: str = "png") -> dict[str, b
     results = []
     for name in ("scenario_1", "scenario_2"):
         with paper_scenario(name) as path:
-            results.append(repair(path, load_config(name, backend=backend)))
+            results.append(repair(path, load_config(name, backend=backend)).outcome)
     drawn = {
         "figure_4": profile_figure(results[0]),
         "figure_4_birdseye": birdseye_figure(results[0]),

@@ -176,6 +176,17 @@ def planning_problem(speed: float, goal_lanelet: Any) -> Any:
 
 
 def scenario_of(map_name: str, tag: str, lanelets: Sequence[Any], obstacles: Sequence[Any]) -> Any:
+    """A CommonRoad scenario that says of itself that it is a reconstruction.
+
+    Parameters
+    ----------
+    map_name : str
+        Of the benchmark id.
+    tag : str
+        ``commonroad.scenario.scenario.Tag``; one, since the writer's order of several is not fixed.
+    lanelets, obstacles : sequence
+        CommonRoad objects.
+    """
     from commonroad.scenario.lanelet import LaneletNetwork
     from commonroad.scenario.scenario import Location, Scenario, ScenarioID, Tag
 
@@ -183,7 +194,6 @@ def scenario_of(map_name: str, tag: str, lanelets: Sequence[Any], obstacles: Seq
         country_id="ZAM", map_name=map_name, map_id=1, configuration_id=1,
         obstacle_behavior="T", prediction_id=1,
     )  # fmt: skip
-    # one tag: the writer iterates over the set, whose order changes from run to run
     scenario = Scenario(
         DT, name, author=AUTHOR, tags={Tag(tag)}, affiliation=AUTHOR, source=SOURCE, location=Location()
     )

@@ -10,8 +10,7 @@ from repair.paper.roads import follow, lanelet_along, planning_problem, quarter_
 
 __all__ = ["scenario_1"]
 
-
-# Scenario 1. The ego starts at the origin, heading along +x. "Measured" means read off
+# The ego starts at the origin, heading along +x. "Measured" means read off
 # DEU_Flensburg-6_1_T-1 as this one number; "fitted" means chosen such that car 36, projected on the
 # ego's path, occupies the same (s, t) region as there; "assumed" means that no source gives it.
 _WIDTH = 3.5  # measured: width of every lane

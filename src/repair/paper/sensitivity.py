@@ -15,8 +15,8 @@ from repair.report.tables import Section, Table, against, decimal
 
 if TYPE_CHECKING:
     from repair.config import Config
+    from repair.prepare import Prepared
     from repair.scene.scene import Scene
-    from repair.situation import Prepared
 
 __all__ = ["VARIATIONS", "Variation", "sensitivity"]
 
@@ -200,7 +200,7 @@ def _row(
     except RepairError as error:
         return {**row, "status_text": f"not available: {error}"}
     row["ttc_s"] = against(None, first.conflict.time)["ours"]
-    row["ttr_s"] = against(None, evasive_ttr(first).ttr)["ours"]
+    row["ttr_s"] = against(None, evasive_ttr(first, first.config.evasive).ttr)["ours"]
     for name in backends:
         if name != backends[0] and variation.for_ego_only:
             continue
@@ -218,7 +218,7 @@ def _row(
 
 def _searched(prepared: Prepared, number: int) -> dict[str, Any]:
     """F-TTR on both grids, and the peak on the coarse one."""
-    from repair.search.search import search_f_ttr
+    from repair.api import find
     from repair.solvers.registry import make_backend
 
     config = prepared.config
@@ -228,14 +228,7 @@ def _searched(prepared: Prepared, number: int) -> dict[str, Any]:
         return {"f_ttr_s": None, "f_ttr_fine_s": None, "peak_mps2": None,
                 "status": "unavailable", "status_text": f"not available: {error}"}  # fmt: skip
     coarse, fine = (
-        search_f_ttr(
-            prepared.source,
-            prepared.conflict,
-            backend,
-            prepared.checker,
-            replace(config.search, delta_t=step),
-        )
-        for step in (_COARSE, _FINE)
+        find(prepared, backend, settings=replace(config.search, delta_t=step)) for step in (_COARSE, _FINE)
     )
     peak = None if coarse.best is None else peak_of(prepared, coarse.best, number)
     return {

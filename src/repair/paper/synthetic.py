@@ -24,8 +24,6 @@ from repair.paper.scenario_2 import scenario_2
 __all__ = ["SCENARIOS", "write_scenario"]
 
 
-# ---------------------------------------------------------------------- files
-
 SCENARIOS: Mapping[str, Callable[[], tuple[Any, Any]]] = MappingProxyType(
     {"scenario_1": scenario_1, "scenario_2": scenario_2}
 )

@@ -16,8 +16,8 @@ from repair.search.result import Probe, SearchResult
 
 if TYPE_CHECKING:
     from repair.config import Config
+    from repair.prepare import Prepared
     from repair.scene.scene import Scene
-    from repair.situation import Prepared
 
 __all__ = ["METHODS", "PEAK_NAMES", "Method", "peak_of", "status_of", "table1"]
 
@@ -144,18 +144,16 @@ def _result(method: Method, number: int, scene: Scene, overrides: Sequence[str])
 
 def _run(config: Config, scene: Scene) -> tuple[Prepared, SearchResult, float | None]:
     """Prepare and run one method; (F-)TTR as the driver has it."""
-    from repair.baselines.evasive.problems import repair_at_ttr
+    from repair.api import find
+    from repair.metrics.base import Asked
     from repair.prepare import prepare
-    from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend
 
     backend = make_backend(config.backend, config)
     prepared = prepare(scene, config)
-    if config.driver == "at_ttr":
-        answer = repair_at_ttr(prepared, backend)
-        return prepared, answer.search, answer.ttr
-    found = search_f_ttr(prepared.source, prepared.conflict, backend, prepared.checker, config.search)
-    return prepared, found, found.f_ttr
+    asked = Asked(prepared, config.evasive)
+    found = find(prepared, backend, asked=asked)
+    return prepared, found, asked.evasive.ttr if config.driver == "at_ttr" else found.f_ttr
 
 
 def peak_of(prepared: Prepared, probe: Probe, number: int) -> float:

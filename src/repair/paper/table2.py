@@ -18,8 +18,8 @@ from repair.report.tables import DASH, Section, Table, against
 from repair.search.result import SearchResult
 
 if TYPE_CHECKING:
+    from repair.prepare import Prepared
     from repair.scene.scene import Scene
-    from repair.situation import Prepared
 
 __all__ = ["literal_transcription", "machine", "table2"]
 
@@ -183,9 +183,9 @@ def _timed(
     name: str, number: int, scene: Scene, runs: int, overrides: Sequence[str], step: Callable[[], Any]
 ) -> tuple[dict[str, Any], Prepared | None]:
     """Time ``runs`` searches of one backend."""
+    from repair.api import find
     from repair.config import load_config
     from repair.prepare import prepare
-    from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend
 
     config = load_config(preset=f"scenario_{number}", overrides=[f"backend={name}", *overrides])
@@ -197,7 +197,7 @@ def _timed(
         return {**row, "status": f"not available: {error}"}, None
 
     def search() -> SearchResult:
-        return search_f_ttr(prepared.source, prepared.conflict, backend, prepared.checker, config.search)
+        return find(prepared, backend)
 
     found = search()  # not timed: matrices are made and libraries loaded
     walls, parts = [], []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,14 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.arrays import Array, frozen
-from repair.config import Config
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.limits import Limits
 from repair.problem.passing import open_passings
-from repair.problem.problem import Maneuver, RepairProblem
-from repair.problem.surroundings import Surroundings, surroundings
+from repair.problem.problem import Maneuver, Passing, RepairProblem
+from repair.problem.settings import RepairConfig
+from repair.problem.surroundings import Surroundings, sides_of, surroundings
 from repair.problem.tables import Grid
 from repair.scene.road.bounds import LateralBounds
+from repair.timegrid import INSTANT, intervals
 from repair.world.boxes import Occupancy
 from repair.world.occupancy import near, relevant
 
@@ -37,7 +37,7 @@ class ProblemFactory:
     Attributes
     ----------
     scene : Scene
-    config : Config
+    settings : RepairConfig
     limits : Limits
     occupancy : Occupancy
         All obstacles, inflated.
@@ -47,7 +47,7 @@ class ProblemFactory:
     """
 
     scene: Scene
-    config: Config
+    settings: RepairConfig
     limits: Limits
     occupancy: Occupancy
     reference: Curve
@@ -57,7 +57,7 @@ class ProblemFactory:
     def bounds(self) -> LateralBounds:
         """Lateral room of the reference point, as ``repair.lateral`` says."""
         wide = {"lane": self.scene.lane, "same_direction": self.scene.same_direction, "road": self.scene.road}
-        return wide.get(self.config.repair.lateral, self.scene.lane)
+        return wide.get(self.settings.lateral, self.scene.lane)
 
     @cached_property
     def _grid(self) -> Grid | None:
@@ -71,7 +71,7 @@ class ProblemFactory:
 
     def relaxed(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
         """The problems again with smaller and smaller margins, as ``repair.relax`` lists them."""
-        for margin in self.config.repair.relax:
+        for margin in self.settings.relax:
             problems = self.at(t_rep, margin)
             if problems:
                 yield problems
@@ -85,40 +85,72 @@ class ProblemFactory:
             Distance to the inflated boxes [m]; negative values allow into them. By default
             ``repair.margin``.
         """
-        settings = self.config.repair
+        settings = self.settings
         margin = settings.margin if margin is None else margin
         lateral = settings.lateral != "none"
         step = self.scene.dt
-        if t_rep > self.t_end - step + 1e-9:
+        if t_rep > self.t_end - step + INSTANT:
             return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
-        count = math.ceil((self.t_end - t_rep) / step - 1e-6)
+        count = intervals(self.t_end - t_rep, step)
         times = t_rep + step * np.arange(count + 1)
         reference, start, occupancy, boxes = self._scenery(t_rep, times, margin, lateral)
         s, curvature = self._axis
         passings = open_passings(
             reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature), boxes
         )
+        # Who keeps the path needs no sideways freedom, and without it the vehicle can be brought to a stop
+        # on any path that it can drive at all.
         return tuple(
-            RepairProblem(
-                reference=self.reference,
-                t_rep=t_rep,
-                t_end=self.t_end,
-                start=start,
-                occupancy=occupancy,
-                bounds=self.bounds,
-                limits=self.limits,
-                clearance=settings.clearance,
-                margin=margin,
-                passing=passing,
-                curvature_s=s,
-                curvature=curvature,
-                dt=step,
-                # Who keeps the path needs no sideways freedom, and without it the vehicle can be
-                # brought to a stop on any path that it can drive at all.
-                strict=not settings.relax,
-                lateral=lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
+            self._problem(
+                t_rep, start, occupancy, margin, passing,
+                lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings
+        )  # fmt: skip
+
+    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+        """The problem at the start of a manoeuvre, with the manoeuvre as the guide, open or not.
+
+        Parameters
+        ----------
+        manoeuvre : Curve
+            From its time-to-repair on.
+        kind : Maneuver
+            What it does about the conflict.
+        """
+        settings, step, t_rep = self.settings, self.scene.dt, manoeuvre.t_start
+        times = t_rep + step * np.arange(intervals(self.t_end - t_rep, step) + 1)
+        reference, guide = self.reference.sample(times), manoeuvre.sample(times)
+        start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
+        lateral = settings.lateral != "none" and kind in (Maneuver.LEFT, Maneuver.RIGHT)
+        occupancy = self._within_reach(start, t_rep, reference.position, lateral)
+        lower, upper = occupancy.at(times)
+        columns = (guide.t, guide.position, guide.velocity, guide.acceleration, guide.jerk)
+        path = FrenetTrajectory(*(frozen(column) for column in columns))
+        passing = Passing(kind, path, sides_of(guide.position, lower, upper), 0.0)
+        return self._problem(t_rep, start, occupancy, settings.margin, passing, lateral)
+
+    def _problem(
+        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing, lateral: bool
+    ) -> RepairProblem:
+        s, curvature = self._axis
+        return RepairProblem(
+            reference=self.reference,
+            t_rep=t_rep,
+            t_end=self.t_end,
+            start=start,
+            occupancy=occupancy,
+            bounds=self.bounds,
+            limits=self.limits,
+            clearance=self.settings.clearance,
+            margin=margin,
+            passing=passing,
+            curvature_s=s,
+            curvature=curvature,
+            dt=self.scene.dt,
+            half_length=self.scene.vehicle.half_length,
+            strict=not self.settings.relax,
+            lateral=lateral,
         )
 
     def _scenery(
@@ -159,5 +191,5 @@ class ProblemFactory:
         if lateral:
             right, left = self.bounds.at(behind + (ahead - behind) * _SHARES)
             rightmost, leftmost = float(right.min()), float(left.max())
-        margin = self.config.repair.margin + self.config.repair.clearance
+        margin = self.settings.margin + self.settings.clearance
         return (behind, ahead), (rightmost - margin, leftmost + margin)

@@ -14,13 +14,23 @@ from repair.problem.problem import Maneuver
 from repair.problem.surroundings import Surroundings
 from repair.scene.road.bounds import LateralBounds
 
-__all__ = ["LateralProfile", "lateral_profiles"]
+__all__ = ["LateralProfile", "lateral_profiles", "quintics"]
 
 
 class LateralProfile(NamedTuple):
-    """One lateral motion l(t) (K,) with its derivatives and cost."""
+    """One lateral motion l(t).
 
-    maneuver: Maneuver | None  # None: keeps the path; yield or go ahead is decided by the speed
+    Attributes
+    ----------
+    maneuver : Maneuver or None
+        None: it keeps the path; yielding or going ahead is then decided by the speed.
+    l, rate, acceleration : (K,) array
+        Offset and derivatives [m], [m/s], [m/s²]; 0.0 stands for an acceleration of 0 throughout.
+    cost : float
+        What it adds to that of the speed; smaller is gentler.
+    """
+
+    maneuver: Maneuver | None
     l: Array  # noqa: E741
     rate: Array
     acceleration: Array | float
@@ -31,8 +41,22 @@ class LateralProfile(NamedTuple):
 _QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
 
 
-def _quintics(start: Array, target: Array, duration: Array, tau: Array) -> tuple[Array, Array, Array]:
-    """Quintics (Q, K) from (l, l', l'') to (target, 0, 0) within the durations (Q,), then constant."""
+def quintics(start: Array, target: Array, duration: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """Quintics from (l, l', l'') to (target, 0, 0), constant from there on.
+
+    Parameters
+    ----------
+    start : (3,) array
+        Offset, rate and acceleration at the time 0.
+    target, duration : (Q,) array
+        Where they end [m], and when [s].
+    tau : (K,) array
+        Times to look at [s].
+
+    Returns
+    -------
+    l, rate, acceleration : (Q, K) array
+    """
     l0, v0, a0 = start.tolist()
     d = np.maximum(duration, 1e-3)
     speed, bend = v0 * d, a0 * d**2
@@ -59,6 +83,26 @@ def lateral_profiles(
     margin: float,
     lateral: bool,
 ) -> list[LateralProfile]:
+    """To keep the path, and motions past the first obstacle in conflict: to either side, fast and slow.
+
+    Parameters
+    ----------
+    start : (3, 2) array
+        State at t_rep.
+    tau : (K,) array
+        Times since t_rep [s].
+    reference : FrenetTrajectory
+        From t_rep on, at these times.
+    boxes : Surroundings
+        The obstacles at these times.
+    limits : Limits
+    bounds : LateralBounds
+        A side without room is left out.
+    margin : float
+        Distance to the boxes that the motions end at [m].
+    lateral : bool
+        Whether moving sideways is allowed; if not, the path is kept.
+    """
     keep = LateralProfile(None, reference.position[:, 1], reference.velocity[:, 1], 0.0, 0.0)
     profiles = [keep]
     if not lateral or boxes.conflict is None:
@@ -88,7 +132,7 @@ def lateral_profiles(
     if not moves:
         return profiles
     kinds, ends, durations = zip(*moves, strict=True)
-    l, rate, acceleration = _quintics(start[:, 1], np.array(ends), np.array(durations), tau)  # noqa: E741
+    l, rate, acceleration = quintics(start[:, 1], np.array(ends), np.array(durations), tau)  # noqa: E741
     cost = np.add.reduce(acceleration**2, axis=1) / len(tau) + 0.1
     return profiles + [
         LateralProfile(*one) for one in zip(kinds, l, rate, acceleration, cost.tolist(), strict=True)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from repair.problem.settings import LimitsConfig
 from repair.vehicle.transitions import POSITION_TOLERANCE
 
@@ -67,8 +65,7 @@ def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: flo
         allows 2 cm of error; a jerk j moves the end by j dt**3 / 12.
     """
     usable = _USABLE * vehicle.a_max
-    engine = usable * min(1.0, vehicle.v_switch / max(speed + 3.0, 1e-3))
-    slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(0.95 * vehicle.steering_max))
+    engine = float(vehicle.engine_acceleration(speed + 3.0, _USABLE))
     drivable = 0.6 * POSITION_TOLERANCE * 12.0 / dt**3
     a_total = usable if config.a_total is None else config.a_total
     return Limits(
@@ -80,5 +77,5 @@ def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: flo
         a_total=a_total,
         j_lon=min(config.j_lon, drivable),
         j_lat=config.j_lat,
-        curvature=float(np.sin(slip) / vehicle.rear),
+        curvature=vehicle.largest_curvature(0.95),
     )

@@ -3,8 +3,8 @@
 EGO-Planner finds the side by an A* path around the obstacle; here the obstacles move, so the
 search is over space and time: a family of manoeuvres (keep the path, move to the left or right of
 the first obstacle in conflict; each with a range of speed changes) is rolled out and tested against
-all boxes at once. The gentlest survivor of each kind is a :class:`repair.problem.problem.Passing`: a guide,
-and the side it takes of every obstacle. A guide respects the acceleration limits, not the jerk
+all boxes at once. The gentlest survivor of each kind is a :class:`repair.problem.problem.Passing`: a
+guide, and the side it takes of every obstacle. A guide respects the acceleration limits, not the jerk
 limits; it shows that a way is open, and a backend makes a trajectory of it.
 """
 
@@ -26,7 +26,7 @@ from repair.problem.surroundings import Surroundings, overlapping, sides_of, sur
 from repair.scene.road.bounds import LateralBounds
 from repair.world.boxes import Occupancy
 
-__all__ = ["open_passings"]
+__all__ = ["open_passings", "possible_maneuvers"]
 
 # The cost of a way that is not open starts here, far above those of open ones.
 _SHUT = 1e3
@@ -62,7 +62,8 @@ def open_passings(
     curvature : (s, kappa) arrays
         Curvature of the path, for the lateral acceleration.
     boxes : Surroundings, optional
-        What :func:`surroundings` says of the reference, the obstacles and the margin, if it is known.
+        What :func:`repair.problem.surroundings.surroundings` says of the reference, the obstacles and
+        the margin, if it is known.
 
     Returns
     -------
@@ -87,7 +88,7 @@ def open_passings(
         meetings = _meetings(speeds, boxes.ends, within & overlap)
         # What a guide must not do costs infinitely much, and so does what counts as another manoeuvre.
         cost = np.where(_entered(meetings) | speeds.family.harsh, np.inf, speeds.cost)
-        for maneuver, others in _kinds(profile, boxes, speeds):
+        for maneuver, others in possible_maneuvers(profile, boxes, speeds):
             p = _gentlest(cost if others is None else np.where(others, np.inf, cost), bends)
             if p is not None:
                 total = float(cost[p]) + profile.cost
@@ -171,10 +172,19 @@ def _closest(
     return {maneuver: (_SHUT + badness, p, profile) for badness, p, profile, maneuver in found}
 
 
-def _kinds(
+def possible_maneuvers(
     profile: LateralProfile, boxes: Surroundings, speeds: Rollouts
 ) -> tuple[tuple[Maneuver, npt.NDArray[np.bool_] | None], ...]:
-    """The manoeuvres that a lateral motion may be part of; for each the speed profiles (P,) of others."""
+    """The manoeuvres that a lateral motion may be part of, by the speed that it is driven at.
+
+    Who keeps the path goes ahead of the obstacle in conflict if it is past its front while beside it, and
+    yields if not. Who moves aside does neither.
+
+    Returns
+    -------
+    tuple of (Maneuver, (P,) bool array or None)
+        For each manoeuvre the speed profiles that are part of another one; None where none is.
+    """
     if profile.maneuver is not None:
         return ((profile.maneuver, None),)
     if boxes.conflict is None:
@@ -198,6 +208,7 @@ def _passing(
     times: Array,
     boxes: Surroundings,
 ) -> Passing:
+    """The speed profile ``p`` and a lateral motion as a guide; the sides it takes when they are asked for."""
     columns = np.zeros((4, len(times), 2))
     columns[0, :, 0], columns[1, :, 0], columns[2, :, 0] = speeds.motion(p)
     columns[0, :, 1], columns[1, :, 1] = profile.l, profile.rate

@@ -16,7 +16,7 @@ from repair.problem.limits import Limits
 from repair.scene.road.bounds import LateralBounds
 from repair.world.boxes import Occupancy
 
-__all__ = ["Maneuver", "Passing", "RepairProblem", "Side"]
+__all__ = ["SIDE_AXIS", "SIDE_SIGN", "Maneuver", "Passing", "RepairProblem", "Side"]
 
 
 class Maneuver(str, Enum):
@@ -38,6 +38,15 @@ class Side(int, Enum):
     AHEAD = 1
     LEFT = 2
     RIGHT = 3
+
+
+#: The coordinate that each side is about, in the order of :class:`Side`: 0 for s, 1 for l.
+SIDE_AXIS: npt.NDArray[np.intp] = np.array([0, 0, 1, 1])
+#: The sign with which that coordinate grows away from the box: ahead and left lie beyond its upper corner,
+#: behind and right before its lower one.
+SIDE_SIGN: Array = np.array([-1.0, 1.0, 1.0, -1.0])
+SIDE_AXIS.setflags(write=False)
+SIDE_SIGN.setflags(write=False)
 
 
 @dataclass(frozen=True)
@@ -105,6 +114,8 @@ class RepairProblem:
         Curvature of the frame's axis [1/m] over s, linear in between.
     dt : float
         The scenario's time step [s].
+    half_length : float
+        Half the length of the ego's body [m]; its position is that of the middle.
     lateral : bool
         Whether the backend may move sideways; if not, l stays on the reference.
     strict : bool
@@ -124,6 +135,7 @@ class RepairProblem:
     curvature_s: Array
     curvature: Array
     dt: float
+    half_length: float
     lateral: bool = True
     strict: bool = False
 

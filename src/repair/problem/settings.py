@@ -2,34 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+from repair.settings import setting
+
+__all__ = ["LimitsConfig", "RepairConfig"]
 
 
 @dataclass
 class LimitsConfig:
     """What a repaired trajectory may do; null means the vehicle's own limit."""
 
-    v_max: float | None = None  # speed [m/s]; null: the vehicle's
-    v_lat: float = 3.0  # speed sideways, across the driven path [m/s]
-    a_min: float | None = None  # braking [m/s²]; null: minus a_total
-    a_max: float | None = None  # accelerating [m/s²]; null: what the engine gives at the initial speed
-    a_lat: float | None = None  # lateral acceleration [m/s²]; null: a_total
-    a_total: float | None = None  # friction circle [m/s²]; null: 0.9 of the vehicle's
-    j_lon: float = 60.0  # jerk along the path [m/s³], at most what the drivability checker can follow
-    j_lat: float = 60.0  # jerk sideways [m/s³]
+    v_max: float | None = setting(None, "speed [m/s]; null: the vehicle's", low=0.1, high=200.0)
+    v_lat: float = setting(3.0, "speed sideways, across the driven path [m/s]", low=1e-3, high=100.0)
+    a_min: float | None = setting(None, "braking [m/s²]; null: minus a_total", low=-100.0, high=-1e-3)
+    a_max: float | None = setting(
+        None,
+        "accelerating [m/s²]; null: what the engine gives at the initial speed",
+        low=1e-3,
+        high=100.0,
+    )
+    a_lat: float | None = setting(None, "lateral acceleration [m/s²]; null: a_total", low=1e-3, high=100.0)
+    a_total: float | None = setting(
+        None, "friction circle [m/s²]; null: 0.9 of the vehicle's", low=1e-3, high=100.0
+    )
+    j_lon: float = setting(
+        60.0,
+        "jerk along the path [m/s³], at most what the drivability checker can follow",
+        low=1e-2,
+        high=1e6,
+    )
+    j_lat: float = setting(60.0, "jerk sideways [m/s³]", low=1e-2, high=1e6)
 
 
 @dataclass
 class RepairConfig:
     """The repair problem, the same for every backend."""
 
-    horizon: float | None = None  # end of the repair [s]; null: TTC + after_conflict
-    after_conflict: float = 3.0  # [s]
-    clearance: float = 0.3  # the paper's s_f [m]
-    margin: float = 0.1  # distance hard backends keep from the inflated box [m]
-    # Margins [m] that hard backends try next where none of the manoeuvres is feasible: down to the
-    # vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
-    relax: list[float] = field(default_factory=lambda: [-0.1, -0.5, -1.2, -2.5])
-    lateral: str = "road"  # none | lane | same_direction | road
-    degree: int = 3  # of the B-spline
-    spacing: float = 0.2  # knot spacing [s]
+    horizon: float | None = setting(
+        None, "end of the repair [s]; null: TTC + after_conflict", low=1e-3, high=1e3
+    )
+    after_conflict: float = setting(
+        3.0, "how long a repair goes on after the conflict [s]", low=0.1, high=1e3
+    )
+    clearance: float = setting(0.3, "the paper's s_f [m]", low=0.0, high=50.0)
+    margin: float = setting(0.1, "distance hard backends keep from the inflated box [m]", low=0.0, high=50.0)
+    relax: list[float] = setting(
+        factory=lambda: [-0.1, -0.5, -1.2, -2.5],
+        # Down to the vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
+        says="margins [m] that hard backends try next where none of the manoeuvres is feasible",
+    )
+    lateral: str = setting(
+        "road",
+        "how far a repair may leave its path sideways",
+        choices=("none", "lane", "same_direction", "road"),
+    )
+    degree: int = setting(3, "of the B-spline", low=3, high=5)
+    spacing: float = setting(0.2, "knot spacing [s]", low=0.02, high=5.0)

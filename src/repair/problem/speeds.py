@@ -46,8 +46,18 @@ class _Family(NamedTuple):
 class Rollouts(NamedTuple):
     """Speed profiles over the guide's times; speed and acceleration are made for those that are looked at.
 
-    Position s and time spent changing the speed (K, P), how long the change takes and cost (P,), and
-    how far back and forth any of them gets (K,).
+    Attributes
+    ----------
+    family
+        What all rollouts over these times have in common.
+    v0 : float
+        Speed at the start [m/s].
+    s, ramp : (K, P) array
+        Position [m], and time spent changing the speed until then [s].
+    change, cost : (P,) array
+        How long the change takes in all [s]; smaller costs are gentler.
+    least, most : (K,) array
+        How far back and forth any of them gets [m].
     """
 
     family: _Family
@@ -101,7 +111,16 @@ def _family(a_min: float, a_max: float, a_total: float, count: int, step: float)
 
 
 def speed_profiles(start: Array, tau: Array, limits: Limits) -> Rollouts:
-    """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse."""
+    """Hold the speed, change it at a constant rate to a target speed, hold that; never reverse.
+
+    Parameters
+    ----------
+    start : (3, 2) array
+        State at t_rep.
+    tau : (K,) array
+        Times since t_rep [s], equally spaced.
+    limits : Limits
+    """
     s0, v0 = float(start[0, 0]), max(float(start[1, 0]), 0.0)
     count, duration = len(tau), max(float(tau[-1]), 1e-9)
     step = round(duration / max(count - 1, 1), 9)
@@ -126,7 +145,15 @@ def speed_profiles(start: Array, tau: Array, limits: Limits) -> Rollouts:
 
 
 class Bends:
-    """What the path's bends leave to the speed profiles: the friction circle and the lateral limit."""
+    """What the path's bends leave to the speed profiles: the friction circle and the lateral limit.
+
+    Parameters
+    ----------
+    speeds : Rollouts
+    limits : Limits
+    curvature : (s, kappa) arrays
+        Curvature of the path [1/m] over s [m], linear in between.
+    """
 
     def __init__(self, speeds: Rollouts, limits: Limits, curvature: tuple[Array, Array]) -> None:
         self.speeds = speeds
@@ -155,7 +182,7 @@ class Bends:
         return bend <= self.lateral and (1.0 + 1e-9) * math.hypot(bend, rate) <= self.total
 
     def excess(self, p: int | slice | npt.NDArray[np.intp]) -> Array:
-        """By how much profiles (P',) do not keep to them."""
+        """By how much profiles ``p`` (P',) do not keep to them [m/s²]; 0 for those that do."""
         s, v, acceleration = self.speeds.motion(p)
         bend = np.abs(np.interp(s, *self.curvature)) * (v * v)
         total = np.sqrt(np.maximum.reduce(bend * bend + acceleration * acceleration, axis=0))

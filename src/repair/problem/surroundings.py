@@ -37,7 +37,15 @@ class Surroundings(NamedTuple):
 
 
 def surroundings(reference: FrenetTrajectory, occupancy: Occupancy, margin: float) -> Surroundings:
-    """Look them up at the reference's times, whatever these are."""
+    """Look them up at the reference's times, whatever these are.
+
+    Parameters
+    ----------
+    reference : FrenetTrajectory
+    occupancy : Occupancy
+    margin : float
+        Added to the boxes on all sides [m]; not for ``conflict``.
+    """
     lower, upper = occupancy.at(reference.t)
     conflict = _conflict(inside(lower, upper, reference.position))
     ends, edges = widened(lower, upper, margin)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
 from repair.problem.surroundings import Surroundings, inside, overlapping, widened
+from repair.timegrid import ROUNDING
 
 if TYPE_CHECKING:
     from repair.curves.base import Curve
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Grid"]
 
 # A time [s] this near to a step is on it; multiples of a step differ from it by rounding errors only.
-_ON_STEP = 1e-12
+_ON_STEP = ROUNDING
 
 
 @dataclass(frozen=True)

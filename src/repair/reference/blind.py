@@ -6,12 +6,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from repair.scene.scene import Scene
+from repair.reference.profile import SpeedProfile
 
-__all__ = ["limit_at"]
+if TYPE_CHECKING:
+    from repair.reference.settings import ReferenceConfig
+    from repair.scene.scene import Scene
+    from repair.world.boxes import Occupancy
+
+__all__ = ["accelerating", "constant_speed", "limit_at"]
 
 _CRUISE = 13.9  # m/s, 50 km/h: where a blind accelerating ego stops accelerating without a sign
+
+
+def constant_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> SpeedProfile:
+    """The initial speed, held to the horizon."""
+    s0, v0 = float(scene.start[0, 0]), float(scene.start[1, 0])
+    return SpeedProfile.from_accelerations(s0, v0, [scene.horizon], [0.0])
+
+
+def accelerating(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> SpeedProfile:
+    """1 m/s² up to the speed limit, or to 13.9 m/s where there is no sign."""
+    s0, v0 = float(scene.start[0, 0]), float(scene.start[1, 0])
+    target = max(v0, limit_at(scene, s0))
+    ramp = min(target - v0, scene.horizon)
+    return SpeedProfile.from_accelerations(s0, v0, [ramp, max(scene.horizon - ramp, 0.0)], [1.0, 0.0])
 
 
 def limit_at(scene: Scene, s: float) -> float:

@@ -16,29 +16,57 @@ from repair.reference.settings import ReferenceConfig
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
+    from repair.world.boxes import Occupancy
 
-__all__ = ["fit_positions", "known_until", "recorded_positions"]
+__all__ = [
+    "known_until",
+    "obstacle_positions",
+    "recorded_reference",
+    "solution_positions",
+    "solution_reference",
+]
+
 _SPEED_MAX = 150.0  # faster than this a recording jumps [m/s]
 _START_OFF = 1.0  # a reference may start this far from the ego [m]
 
 
-def recorded_positions(scene: Scene, config: ReferenceConfig) -> tuple[Array, str]:
-    """Centre positions (T, 2) of a recorded reference at the scenario's steps, and what they are of.
+def obstacle_positions(scene: Scene, config: ReferenceConfig) -> Array:
+    """Centre positions (T, 2) of a recorded obstacle at the scenario's steps.
 
     Raises
     ------
     ReferenceTrajectoryError
-        If there is no such obstacle or file.
+        If there is no such obstacle, or it jumps.
     """
-    recorded = config.source == "recorded"
-    positions, what = _recorded(scene, config.obstacle_id) if recorded else _from_solution(scene, config.file)
+    return _without_jumps(scene, *_recorded(scene, config.obstacle_id))[0]
+
+
+def solution_positions(scene: Scene, config: ReferenceConfig) -> Array:
+    """Centre positions (T, 2) in a solution file at the scenario's steps.
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        If there is no such file, it is of another scenario, or it jumps.
+    """
+    return _without_jumps(scene, *_from_solution(scene, config.file))[0]
+
+
+def recorded_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
+    """A spline through the positions of a recorded obstacle."""
+    return _fit_positions(scene, *_without_jumps(scene, *_recorded(scene, config.obstacle_id)))
+
+
+def solution_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
+    """A spline through the positions in a solution file."""
+    return _fit_positions(scene, *_without_jumps(scene, *_from_solution(scene, config.file)))
+
+
+def _without_jumps(scene: Scene, positions: Array, what: str) -> tuple[Array, str]:
     moved = np.hypot(*np.diff(positions[: known_until(positions)], axis=0).T)
     if (moved > _SPEED_MAX * scene.dt).any():
         raise ReferenceTrajectoryError(f"{scene.id}: {what} jumps by {moved.max():.3g} m within a time step")
     return positions, what
-
-
-# -- recorded --------------------------------------------------------------------------------------
 
 
 def _recorded(scene: Scene, obstacle_id: int | None) -> tuple[Array, str]:
@@ -102,7 +130,7 @@ def known_until(positions: Array) -> int:
     return len(known) if known.all() else int(np.argmin(known))
 
 
-def fit_positions(scene: Scene, positions: Array, what: str) -> UniformBSpline:
+def _fit_positions(scene: Scene, positions: Array, what: str) -> UniformBSpline:
     """Spline through recorded centre positions (T, 2), as far as they go without a gap."""
     last = known_until(positions)
     if last < 4:

@@ -1,21 +1,76 @@
-"""Reference trajectories by the name of their source."""
+"""Reference trajectories by the name of their source (``reference.source``)."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from repair.arrays import Array
 from repair.curves.base import Curve
-from repair.reference.blind import limit_at
-from repair.reference.planner import plan_speed
-from repair.reference.profile import SpeedProfile
-from repair.reference.recorded import fit_positions, recorded_positions
-from repair.reference.settings import ReferenceConfig
-from repair.world.boxes import Occupancy
+from repair.errors import ConfigError, ReferenceTrajectoryError
+from repair.reference.base import Along, MakeReference, ReferenceSource
+from repair.registry import Registry, loaded
 
 if TYPE_CHECKING:
+    from repair.reference.settings import ReferenceConfig
     from repair.scene.scene import Scene
+    from repair.world.boxes import Occupancy
 
-__all__ = ["make_reference"]
+__all__ = ["SOURCES", "make_reference", "positions_along", "register"]
+
+SOURCES: Registry[ReferenceSource] = Registry(
+    "reference source",
+    {
+        "planner": ReferenceSource(
+            "repair.reference.planner:plan_speed", says="speeds by graph search along the route"
+        ),
+        "constant": ReferenceSource("repair.reference.blind:constant_speed", says="the initial speed, held"),
+        "accelerate": ReferenceSource(
+            "repair.reference.blind:accelerating", says="1 m/s² up to the speed limit or 13.9 m/s"
+        ),
+        "recorded": ReferenceSource(
+            "repair.reference.recorded:recorded_reference",
+            "repair.reference.recorded:obstacle_positions",
+            becomes_ego=True,
+            says="an obstacle's trajectory, reference.obstacle_id",
+        ),
+        "file": ReferenceSource(
+            "repair.reference.recorded:solution_reference",
+            "repair.reference.recorded:solution_positions",
+            says="a CommonRoad solution file, reference.file",
+        ),
+    },
+    error=ConfigError,
+    group="repair.references",
+)
+
+
+def register(name: str, source: ReferenceSource | MakeReference) -> None:
+    """Add a source of references of your own for this process; ``reference.source: name`` asks for it.
+
+    Parameters
+    ----------
+    name : str
+    source : ReferenceSource or callable
+        A callable alone is :attr:`ReferenceSource.make`.
+
+    Raises
+    ------
+    ConfigError
+        If the name is taken.
+    """
+    SOURCES.register(name, source if isinstance(source, ReferenceSource) else ReferenceSource(source))
+
+
+def positions_along(scene: Scene, config: ReferenceConfig) -> Array | None:
+    """The positions along which the scene's frame has to run; None where it runs along the route.
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        If the source has none; the sentence says what is missing.
+    """
+    along: Along | str | None = SOURCES[config.source].along
+    return None if along is None else loaded(along)(scene, config)
 
 
 def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
@@ -31,14 +86,10 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
     ReferenceTrajectoryError
         If the source has no usable trajectory; the sentence says what is missing.
     """
-    if config.source == "planner":
-        return plan_speed(scene, config, occupancy)
-    s0, v0 = float(scene.start[0, 0]), float(scene.start[1, 0])
-    if config.source == "constant":
-        return SpeedProfile.from_accelerations(s0, v0, [scene.horizon], [0.0])
-    if config.source == "accelerate":
-        target = max(v0, limit_at(scene, s0))
-        ramp = min(target - v0, scene.horizon)
-        return SpeedProfile.from_accelerations(s0, v0, [ramp, max(scene.horizon - ramp, 0.0)], [1.0, 0.0])
-    positions, what = recorded_positions(scene, config)
-    return fit_positions(scene, positions, what)
+    curve = loaded(SOURCES[config.source].make)(scene, config, occupancy)
+    if not isinstance(curve, Curve):
+        raise ReferenceTrajectoryError(
+            f"reference source {config.source!r} gave {type(curve).__name__}; it has to give a curve "
+            "with t_start, t_end and sample(t)"
+        )
+    return curve

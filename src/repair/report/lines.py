@@ -1,89 +1,92 @@
-"""The driven curves of a result as lines to draw."""
+"""The driven curves of an outcome as lines to draw: labels, colours, dashes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from repair.arrays import Array
-from repair.curves.base import Curve, SplicedCurve
+from repair.errors import OutputError
+from repair.outcome.data import Drawing, Line, Outcome
 from repair.report.style import REFERENCE
-from repair.search.result import Probe
+from repair.timegrid import STEP
 
-if TYPE_CHECKING:
-    from repair.api import RepairResult
-
-__all__ = ["Line", "coloured", "line_of", "probe_line", "reference_line", "shown_until", "title_of"]
+__all__ = ["Styled", "drawing_in", "reference_line", "repair_lines", "title_of"]
 
 
 @dataclass(frozen=True)
-class Line:
-    """One driven curve: its samples in both frames, and how it is drawn."""
+class Styled:
+    """A line, and how it is drawn.
 
+    Attributes
+    ----------
+    line : Line
+    label : str
+    style : dict
+        For matplotlib's ``plot``.
+    feasible : bool
+        Whether what it shows passed every check.
+    """
+
+    line: Line
     label: str
-    t: Array
-    position: Array
-    xy: Array
-    speed: Array
-    acceleration: Array
     style: dict[str, Any]
+    feasible: bool = True
 
 
-# -- lines -----------------------------------------------------------------------------------------
+def drawing_in(outcome: Outcome) -> Drawing:
+    """What there is to draw.
+
+    Raises
+    ------
+    OutputError
+        If the outcome was loaded from a folder that holds none.
+    """
+    if outcome.drawing is None:
+        raise OutputError(
+            f"the result of {outcome.scenario} holds nothing to draw; repair it again with this version"
+        )
+    return outcome.drawing
 
 
-def line_of(
-    result: RepairResult, curve: Curve, t_rep: float | None, label: str, style: dict[str, Any]
-) -> Line:
-    """Sample a curve from ``t_rep`` on, or from 0; accelerations as in :mod:`repair.check.peaks`."""
-    prepared = result.prepared
-    t_end = prepared.t_end if t_rep is not None else prepared.t_reference
-    whole = curve if t_rep is None else SplicedCurve(prepared.reference, curve, t_rep)
-    samples = whole.sample(prepared.checker.times(t_end))
-    path = prepared.scene.frame.cartesian(samples)
-    acceleration = np.gradient(path.speed, path.t) if len(path.t) > 2 else np.zeros(len(path.t))
-    k = path.t >= (t_rep or 0.0) - 1e-9
-    return Line(label, path.t[k], samples.position[k], path.xy[k], path.speed[k], acceleration[k], style)
+def reference_line(outcome: Outcome) -> Styled:
+    """The reference, dotted."""
+    return Styled(drawing_in(outcome).lines[0], "reference", {"color": REFERENCE, "lw": 1.4, "ls": ":"})
 
 
-def reference_line(result: RepairResult) -> Line:
-    style = {"color": REFERENCE, "lw": 1.4, "ls": ":"}
-    line = line_of(result, result.prepared.reference, None, "reference", style)
-    shown = line.t <= shown_until(result) + 1e-9
-    names = ("t", "position", "xy", "speed", "acceleration")
-    return replace(line, **{name: getattr(line, name)[shown] for name in names})
+def repair_lines(outcome: Outcome) -> list[Styled]:
+    """The repairs of all visited times-to-repair, by t_rep, in the order of a colour-blind-safe map.
 
-
-def shown_until(result: RepairResult) -> float:
-    """End of the time axis: that of the repairs, or of the reference where nothing is repaired."""
-    prepared = result.prepared
-    return prepared.t_end if result.search.probes else prepared.t_reference
-
-
-def coloured(result: RepairResult) -> list[tuple[Probe, Any]]:
-    """The probes that have a curve, by t_rep, each with its colour."""
+    Dashed is what did not pass a check; the F-TTR is the widest.
+    """
     from matplotlib import colormaps
 
-    probes = sorted((p for p in result.search.probes if p.solve.curve is not None), key=lambda p: p.t_rep)
-    shades: Any = np.linspace(0.08, 0.86, max(len(probes), 2))[-len(probes) :] if probes else []
-    return [(p, colormaps["viridis"](shade)) for p, shade in zip(probes, shades, strict=True)]
+    curves = [line for line in drawing_in(outcome).lines if line.kind == "repair"]
+    probes = [p for p in outcome.probes if _has_curve(p, curves)]
+    pairs = sorted(zip(curves, probes, strict=True), key=lambda pair: pair[0].t_rep or 0.0)
+    shades: Any = np.linspace(0.08, 0.86, max(len(pairs), 2))[-len(pairs) :] if pairs else []
+    return [
+        _styled(outcome, *pair, colormaps["viridis"](shade))
+        for pair, shade in zip(pairs, shades, strict=True)
+    ]
 
 
-def probe_line(result: RepairResult, probe: Probe, colour: Any) -> Line:
-    assert probe.solve.curve is not None
-    best = result.search.best is probe
+def _has_curve(probe: dict[str, Any], curves: list[Line]) -> bool:
+    return any(abs((line.t_rep or 0.0) - probe["t_rep_s"]) < STEP for line in curves)
+
+
+def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) -> Styled:
+    best = probe["feasible"] and outcome.f_ttr is not None and abs(probe["t_rep_s"] - outcome.f_ttr) < STEP
     verdict = " (F-TTR)" if best else ""
-    if not probe.feasible:
-        verdict = "\n" + ", ".join(probe.verdict.reasons).replace("_", " ")
-    style = {"color": colour, "lw": 2.4 if best else 1.5, "ls": "-" if probe.feasible else (0, (4, 2))}
-    return line_of(result, probe.solve.curve, probe.t_rep, f"$t_{{rep}}$ = {probe.t_rep:g} s{verdict}", style)
+    if not probe["feasible"]:
+        verdict = "\n" + ", ".join(probe["reasons"]).replace("_", " ")
+    style = {"color": colour, "lw": 2.4 if best else 1.5, "ls": "-" if probe["feasible"] else (0, (4, 2))}
+    label = f"$t_{{rep}}$ = {probe['t_rep_s']:g} s{verdict}"
+    return Styled(line, label, style, bool(probe["feasible"]))
 
 
-def title_of(result: RepairResult) -> str:
-    from repair.scene.provenance import provenance
-
-    scene, config = result.prepared.scene, result.prepared.config
-    kind = " (reconstruction)" if provenance(scene)["kind"] == "reconstruction" else ""
-    return f"{scene.id}{kind}, backend {config.backend}"
+def title_of(outcome: Outcome) -> str:
+    """Scenario, where it comes from if it is a reconstruction, and backend."""
+    kind = " (reconstruction)" if outcome.record["provenance"]["kind"] == "reconstruction" else ""
+    return f"{outcome.scenario}{kind}, backend {outcome.backend}"

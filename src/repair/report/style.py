@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["EGO", "OBSTACLE", "REFERENCE", "STYLE", "WIDTH", "render"]
+__all__ = ["EGO", "OBSTACLE", "OTHERS", "REFERENCE", "STYLE", "WIDTH", "render"]
 
 WIDTH = 8.0  # in; at 150 dots per inch readable at the width of a README
-EGO, OBSTACLE, REFERENCE = "#0072B2", "#D55E00", "#000000"
+EGO, OBSTACLE, OTHERS, REFERENCE = "#0072B2", "#D55E00", "#8A8A8A", "#000000"
 STYLE: Any = {
     "axes.grid": True,
     "grid.alpha": 0.25,
@@ -23,9 +20,12 @@ STYLE: Any = {
 
 def render(figure: Any, file_format: str = "png") -> bytes:
     """A figure as the bytes of a file (``png``, ``pdf``, ``svg``), the same bytes for the same figure."""
+    from matplotlib import rc_context
+
     buffer = BytesIO()
     metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(
         file_format
     )
-    figure.savefig(buffer, format=file_format, dpi=150, bbox_inches="tight", metadata=metadata)
+    with rc_context({"svg.hashsalt": "repair"}):  # else the ids in an SVG are random
+        figure.savefig(buffer, format=file_format, dpi=150, bbox_inches="tight", metadata=metadata)
     return buffer.getvalue()

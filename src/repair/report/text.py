@@ -45,6 +45,8 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))
+    if content["metrics"]:
+        rows.append(("Metrics", _metrics(content["metrics"])))
     lines = [f"{name:9} {text}" for name, text in rows]
     if not content["complete"]:
         lines.append("          The search was stopped early: a later time-to-repair may be feasible.")
@@ -80,6 +82,16 @@ def _f_ttr(content: dict[str, Any]) -> str:
     return "unlimited: there is nothing to react to" if content["status"] == "no_conflict" else "none"
 
 
+def _metrics(metrics: dict[str, Any]) -> str:
+    """Each with its value, or with the word that stands in its place."""
+    parts = []
+    for name, metric in metrics.items():
+        unit, value = next((k.removeprefix("value_"), v) for k, v in metric.items() if k.startswith("value_"))
+        word = metric["status"].replace("_", " ")
+        parts.append(f"{name.upper()} {word if value is None else f'{value:.2f} {unit}'}")
+    return ", ".join(parts)
+
+
 def _extremes(content: dict[str, Any]) -> str:
     return (
         f"peak deceleration {fixed(content['peak_deceleration_mps2'])} m/s², "
@@ -89,6 +101,7 @@ def _extremes(content: dict[str, Any]) -> str:
 
 
 def probe_table(probes: list[dict[str, Any]]) -> list[str]:
+    """The visited times-to-repair as lines, then what was wrong with each."""
     head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_lat", "v_min", "solver", "solve", "check")
     units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
     table: list[tuple[str, ...]] = [head, units]
@@ -130,6 +143,7 @@ def probe_table(probes: list[dict[str, Any]]) -> list[str]:
 
 
 def fixed(value: float | None) -> str:
+    """Two decimals; a dash where there is no number."""
     return "-" if value is None else f"{round(value, 2) + 0.0:.2f}"  # no -0.00
 
 

@@ -20,10 +20,12 @@ from repair.scene.road.goal import goal_areas
 from repair.scene.road.lanes import Lane, lanes_of
 from repair.scene.road.route import Route, plan_route
 from repair.scene.scene import Scene
+from repair.scene.settings import SceneConfig
 from repair.scene.speed_signs import speed_limit_along
 from repair.scene.start import first_step_of, initial_state_of, is_ego
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
-from repair.vehicle.parameters import Vehicle, load_vehicle
+from repair.timegrid import steps_until
+from repair.vehicle.model import vehicle_model
 
 __all__ = ["load_scene", "scene_from_scenario"]
 
@@ -34,12 +36,13 @@ _ROUTE_MAX = 400.0  # road ahead of the ego that is looked at [m]
 
 def load_scene(
     path: str | Path,
+    config: Any = None,
     *,
     planning_problem: int | None = None,
-    vehicle: int = 1,
+    vehicle: int | str | None = None,
     horizon: float | None = None,
-    after_prediction: str = "remove",
-    smoothing: float = 0.15,
+    after_prediction: str | None = None,
+    smoothing: float | None = None,
 ) -> Scene:
     """Read a CommonRoad XML file and make a scene of one planning problem in it.
 
@@ -47,34 +50,34 @@ def load_scene(
     ----------
     path : path
         The file; at most 200 MB, without document type declarations.
-    planning_problem : int, optional
-        Id of the planning problem; by default the smallest one.
-    vehicle : int
-        CommonRoad vehicle type of the ego, 1 to 4.
-    horizon : float, optional
-        Consider at most this time [s]; by default at most 10 s.
-    after_prediction : str
-        ``remove``, ``hold`` or ``constant_velocity``: what becomes of an obstacle after its
-        prediction.
-    smoothing : float
-        How far smoothing may move the route's centre line [m]; more of it means gentler curves.
+    config : Config or SceneConfig, optional
+        How it is read (the section ``scene``); a repair of the scene may not ask for anything else.
+    planning_problem, vehicle, horizon, after_prediction, smoothing
+        Single keys of that section, laid over it.
+
+    Returns
+    -------
+    Scene
+        Its ``settings`` say what it was loaded with.
 
     Raises
     ------
     ScenarioError
         If the file cannot be read or lacks what planning needs; the sentence names the file.
     ConfigError
-        If ``vehicle``, ``horizon`` or ``after_prediction`` is not one of the possible values.
+        If a setting has an impossible value.
     """
     from repair.scene.reading import read_file
 
+    asked = {
+        "planning_problem": planning_problem, "vehicle": vehicle, "horizon": horizon,
+        "after_prediction": after_prediction, "smoothing": smoothing,
+    }  # fmt: skip
+    settings = _settings(config, asked)
     contents = read_file(Path(path))
     try:
-        problem, note = _select(contents.problems, planning_problem)
-        scene = scene_from_scenario(
-            contents.scenario, problem, vehicle=vehicle, horizon=horizon, after_prediction=after_prediction,
-            smoothing=smoothing,
-        )  # fmt: skip
+        problem, note = _select(contents.problems, settings.planning_problem)
+        scene = _quiet(contents.scenario, problem, settings)
     except ScenarioError as error:
         raise ScenarioError(f"{contents.path.name}: {error}") from error
     return replace(
@@ -84,6 +87,16 @@ def load_scene(
         sha256=contents.sha256,
         notes=(*contents.notes, *note, *scene.notes),
     )
+
+
+def _settings(config: Any, asked: Mapping[str, Any]) -> SceneConfig:
+    """The section ``scene`` of a configuration, or the section itself, with single keys laid over it."""
+    section = getattr(config, "scene", config)
+    if section is None:
+        section = SceneConfig()
+    if not isinstance(section, SceneConfig):
+        raise ConfigError(f"a scene is loaded with a configuration, not with {type(config).__name__}")
+    return replace(section, **{key: value for key, value in asked.items() if value is not None})
 
 
 def _select(problems: Mapping[int, Any], wanted: int | None) -> tuple[Any, tuple[str, ...]]:
@@ -101,21 +114,29 @@ def _select(problems: Mapping[int, Any], wanted: int | None) -> tuple[Any, tuple
 def scene_from_scenario(
     scenario: Any,
     planning_problem: Any,
+    config: Any = None,
     *,
-    vehicle: int = 1,
+    vehicle: int | str | None = None,
     horizon: float | None = None,
-    after_prediction: str = "remove",
-    smoothing: float = 0.15,
+    after_prediction: str | None = None,
+    smoothing: float | None = None,
 ) -> Scene:
     """Make a scene of a CommonRoad scenario and planning problem in memory; see :func:`load_scene`."""
+    asked = {
+        "vehicle": vehicle, "horizon": horizon, "after_prediction": after_prediction, "smoothing": smoothing,
+    }  # fmt: skip
+    return _quiet(scenario, planning_problem, _settings(config, asked))
+
+
+def _quiet(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=r"(commonroad|shapely|google)\.")
-        return _build(scenario, planning_problem, load_vehicle(vehicle), horizon, after_prediction, smoothing)
+        return _build(scenario, problem, settings)
 
 
-def _build(
-    scenario: Any, problem: Any, vehicle: Vehicle, horizon: float | None, after: str, smoothing: float
-) -> Scene:
+def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
+    model = vehicle_model(settings.vehicle)
+    vehicle, after, smoothing = model.parameters, settings.after_prediction, settings.smoothing
     if not (np.isfinite(smoothing) and smoothing > 0.0):
         raise ConfigError(f"smoothing is {smoothing!r} m; it has to be positive")
     dt = float(scenario.dt)
@@ -123,7 +144,7 @@ def _build(
         raise ScenarioError(f"the time step is {dt!r} s; it has to be positive, from 0.001 to 10 s")
     ego = initial_state_of(problem.initial_state)
     first_step = first_step_of(problem.initial_state)
-    n_steps = _steps_considered(scenario, problem, dt, first_step, horizon, after)
+    n_steps = _steps_considered(scenario, problem, dt, first_step, settings.horizon, after)
     duration = n_steps * dt
 
     lanes, notes = lanes_of(scenario.lanelet_network)
@@ -143,9 +164,9 @@ def _build(
         ego_id=int(problem.planning_problem_id), ego_speed=ego.velocity,
     )  # fmt: skip
     found = crossings(frame, lanes)
-    half = vehicle.width / 2.0
+    half = vehicle.half_width
     return Scene(
-        id=str(scenario.scenario_id), path=None, sha256="", dt=dt, frame=frame, vehicle=vehicle,
+        id=str(scenario.scenario_id), path=None, sha256="", dt=dt, frame=frame, model=model,
         start=frozen([[s0, 0.0], [ego.velocity, 0.0], [ego.acceleration, 0.0]]),
         initial_state=ego, planning_problem_id=int(problem.planning_problem_id), initial_time_step=first_step,
         goal_s=_goal_s(frame, s0, route, lanes, problem.goal), route_end_s=frame.length,
@@ -157,6 +178,7 @@ def _build(
         road=lateral_bounds(found, half),
         speed_limit=speed_limit_along(scenario, frame, route, lanes, notes),
         notes=(*notes, *remarks), scenario=scenario, planning_problem=problem,
+        settings=settings,
     )  # fmt: skip
 
 
@@ -166,7 +188,7 @@ def _steps_considered(
     """Steps to the last prediction, else to the goal's time, else 5 s; at most ``horizon``."""
     if horizon is not None and not (np.isfinite(horizon) and horizon > 0.0):
         raise ConfigError(f"the horizon is {horizon!r} s; it has to be positive")
-    limit = max(int(np.floor((_HORIZON_MAX if horizon is None else horizon) / dt + 1e-6)), 1)
+    limit = max(steps_until(_HORIZON_MAX if horizon is None else horizon, dt), 1)
     last = last_predicted_step(scenario)
     if last is not None and last > first:
         open_ended = after != "remove" and horizon is not None

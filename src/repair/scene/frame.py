@@ -248,7 +248,7 @@ class FrenetFrame:
     # ------------------------------------------------------------------ trajectories
 
     def cartesian(self, trajectory: FrenetTrajectory) -> CartesianPath:
-        """Carry a Frenet trajectory into the plane; see :class:`CartesianPath`."""
+        """Carry a Frenet trajectory into the plane; see :class:`repair.curves.plane.CartesianPath`."""
         motion = np.empty((4, len(trajectory)))
         motion[:2], motion[2:] = trajectory.position.T, trajectory.velocity.T
         return self.carry(trajectory.t, motion)
@@ -257,6 +257,12 @@ class FrenetFrame:
         """As :meth:`cartesian`, of the only rows (4, K) that it needs: s, l and their rates.
 
         Every repair that is tried comes through here: calls into NumPy are what it costs.
+
+        Parameters
+        ----------
+        t : (K,) array
+            Times [s].
+        motion : (4, K) array
         """
         s, l, s_rate, l_rate = motion  # noqa: E741
         index, way, (c3, c2, c1, c0) = self._locate(s)
@@ -319,7 +325,17 @@ def _pairs(x: Array, y: Array) -> Array:
 
 
 def held_headings(heading: Array, fallback: Array, pace: Array) -> Array:
-    """Headings with those of standing samples taken from the last (else the first) moving one."""
+    """Headings with those of standing samples taken from the last (else the first) moving one.
+
+    Parameters
+    ----------
+    heading : (K,) array
+        Where the vehicle goes [rad]; without meaning where it stands.
+    fallback : (K,) array
+        Where the path goes; the first one holds for who never moves.
+    pace : (K,) array
+        How fast the vehicle is, whatever its direction [m/s].
+    """
     moving = pace >= STANDSTILL
     count = np.count_nonzero(moving)
     if not count:

@@ -11,7 +11,7 @@ from repair.errors import ScenarioError
 from repair.scene.frame import FrenetFrame
 from repair.vehicle.parameters import Vehicle
 
-__all__ = ["LeadIn", "drive_path", "largest_curvature"]
+__all__ = ["LeadIn", "drive_path"]
 
 _BACK = 30.0  # path behind the ego, so that followers have coordinates [m]
 _COMFORT = 1.5  # lateral acceleration that the lead-in may add at the initial speed [m/s²]
@@ -21,18 +21,24 @@ _STEEP = 0.6  # heading error above which the ego first turns towards the route 
 
 @dataclass(frozen=True)
 class LeadIn:
-    """The frame along the driven path, the ego's arc length on it, and what had to be assumed."""
+    """The path onto the route.
+
+    Attributes
+    ----------
+    frame : FrenetFrame
+        Along the driven path.
+    start : float
+        The ego's arc length on it [m].
+    blend : float
+        Length over which the path runs into the route [m].
+    notes : tuple of str
+        What had to be assumed.
+    """
 
     frame: FrenetFrame
     start: float
     blend: float
     notes: tuple[str, ...]
-
-
-def largest_curvature(vehicle: Vehicle) -> float:
-    """Largest path curvature of the body centre [1/m], from the steering limit (kinematic model)."""
-    slip = np.arctan(np.tan(vehicle.steering_max) * vehicle.rear / vehicle.wheelbase)
-    return float(np.sin(slip) / vehicle.rear)
 
 
 def _route_frame(center: Array, smoothing: float) -> tuple[FrenetFrame, float]:
@@ -165,12 +171,12 @@ def drive_path(
     notes = []
     if tolerance > smoothing:
         notes.append(f"kinks of the centre line were smoothed by up to {tolerance:g} m")
-    limit = 0.8 * largest_curvature(vehicle)
+    limit = 0.8 * vehicle.largest_curvature()
     s0, l0 = frame.to_frenet(np.asarray(position)[None])[0]
     if not np.isfinite(s0):
         raise ScenarioError("the ego's initial position cannot be projected on its route")
     curvature = float(np.clip(frame.curvature(s0) / (1.0 - frame.curvature(s0) * l0), -limit, limit))
-    direction = orientation + float(np.arcsin(vehicle.rear * curvature))
+    direction = orientation + vehicle.steady_slip(curvature)
     error = _wrapped(direction - float(frame.heading(s0)))
     turn: Array = np.empty((0, 2))
     if abs(error) > _STEEP:

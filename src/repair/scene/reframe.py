@@ -26,6 +26,12 @@ def reframe(scene: Scene, positions: Array) -> Scene:
 
     A reference that changes lanes then has l = 0 like any other, so that it can be followed more
     slowly without leaving its path.
+
+    Parameters
+    ----------
+    scene : Scene
+    positions : (T, 2) array
+        [m]; of fewer than four different ones no path is made, and the scene stays as it is.
     """
     path = [positions[0]]
     for point in positions[1:]:
@@ -52,7 +58,7 @@ def reframe(scene: Scene, positions: Array) -> Scene:
     speed, acceleration = scene.start[1, 0], scene.start[2, 0]
     lanes, _ = lanes_of(scene.scenario.lanelet_network)
     found = crossings(frame, lanes)
-    half = 0.5 * scene.vehicle.width
+    half = scene.vehicle.half_width
     return replace(
         scene,
         frame=frame,

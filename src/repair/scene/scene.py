@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
+from repair.scene.settings import SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
+from repair.vehicle.model import VehicleModel
 from repair.vehicle.parameters import Vehicle
 
 __all__ = ["InitialState", "Scene", "SpeedLimit"]
@@ -60,7 +63,8 @@ class Scene:
         Time step [s].
     frame : FrenetFrame
         Along the path the ego drives: from its pose onto the route's centre line.
-    vehicle : Vehicle
+    model : VehicleModel
+        The ego: how it drives, and its parameters (``vehicle``).
     start : (3, 2) array
         Position, velocity and acceleration ``[s, l]`` at t = 0; l = 0 by construction.
     initial_state : InitialState
@@ -84,7 +88,10 @@ class Scene:
     notes : tuple of str
         What had to be assumed or left out.
     scenario, planning_problem
-        The CommonRoad objects.
+        The CommonRoad objects that were given. The traffic is ``obstacles``; those of the scenario are
+        looked at by nobody, and what CommonRoad's own checker is to judge comes from :meth:`official`.
+    settings : SceneConfig
+        What the scene was loaded with.
     """
 
     id: str
@@ -92,7 +99,7 @@ class Scene:
     sha256: str
     dt: float
     frame: FrenetFrame
-    vehicle: Vehicle
+    model: VehicleModel
     start: Array
     initial_state: InitialState
     planning_problem_id: int
@@ -111,6 +118,24 @@ class Scene:
     notes: tuple[str, ...]
     scenario: Any
     planning_problem: Any
+    settings: SceneConfig = field(default_factory=SceneConfig)
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """Body, reference point and limits of the ego."""
+        return self.model.parameters
+
+    def official(self) -> Any:
+        """The CommonRoad scenario with the traffic of this scene alone: a copy.
+
+        Recordings of the ego itself are left out, with which every solution would collide.
+        """
+        kept = {id(obstacle.source) for obstacle in self.obstacles}
+        gone = {o.obstacle_id for o in self.scenario.dynamic_obstacles if id(o) not in kept}
+        copied = deepcopy(self.scenario)
+        for obstacle in [o for o in copied.dynamic_obstacles if o.obstacle_id in gone]:
+            copied.remove_obstacle(obstacle)
+        return copied
 
     @property
     def times(self) -> Array:

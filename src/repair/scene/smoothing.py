@@ -15,6 +15,13 @@ _MIN_LENGTH = 1.0  # a shorter path has no meaningful direction [m]
 
 
 def cleaned(points: npt.ArrayLike) -> Array:
+    """Points (M, 2) of a path without those that repeat the one before.
+
+    Raises
+    ------
+    ScenarioError
+        If they are not finite or not (M, 2), or the path is shorter than 1 m.
+    """
     path = np.asarray(points, dtype=np.float64)
     if path.ndim != 2 or path.shape[1] != 2:
         raise ScenarioError(f"a path needs points of shape (M, 2), not {path.shape}")
@@ -31,10 +38,12 @@ def cleaned(points: npt.ArrayLike) -> Array:
 
 
 def _chord(path: Array) -> Array:
+    """Length (M,) of a polyline up to each of its points."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
 
 def resampled(path: Array, spacing: float) -> Array:
+    """Points along a polyline, equally far apart: ``spacing`` [m] at most."""
     chord = _chord(path)
     query = np.linspace(0.0, chord[-1], max(int(np.ceil(chord[-1] / spacing)), 4) + 1)
     return np.stack([np.interp(query, chord, path[:, 0]), np.interp(query, chord, path[:, 1])], axis=1)
@@ -45,6 +54,13 @@ def smoothed(path: Array, tolerance: float) -> Array:
 
     Whittaker's smoother: minimise ``|x - p|^2 + w |D3 x|^2``. The weight is the largest of a
     geometric series at which no point moves farther than ``tolerance``. The ends are held.
+
+    Parameters
+    ----------
+    path : (M, 2) array
+        Equally spaced points [m].
+    tolerance : float
+        [m]
     """
     from scipy.linalg import solveh_banded
 

@@ -20,7 +20,19 @@ __all__ = ["speed_limit_along"]
 def speed_limit_along(
     scenario: Any, frame: FrenetFrame, route: Route, lanes: Mapping[int, Lane], notes: list[str]
 ) -> SpeedLimit | None:
-    """Limits by traffic signs on the route's lanelets."""
+    """Limits by traffic signs on the route's lanelets; None where no sign limits the speed.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+    frame : FrenetFrame
+        Over whose arc length they are tabulated.
+    route : Route
+    lanes : mapping
+        The map's lanes by id.
+    notes : list of str
+        Signs that cannot be read are added here.
+    """
     from commonroad.scenario.traffic_sign import SupportedTrafficSignCountry
     from commonroad.scenario.traffic_sign_interpreter import TrafficSignInterpreter
 

@@ -9,14 +9,24 @@ import numpy as np
 from repair.errors import ScenarioError
 from repair.scene.scene import InitialState
 from repair.scene.traffic.shapes import FAR
+from repair.scene.traffic.timeline import STEPS_MAX
 from repair.vehicle.parameters import Vehicle
 
 __all__ = ["SPEED_RANGE", "first_step_of", "initial_state_of", "is_ego"]
-_STEPS_MAX = 10**9  # of the initial time step
-SPEED_RANGE = (-0.1, 100.0)  # initial speeds that can be dealt with [m/s]
+
+SPEED_RANGE = (-0.1, 100.0)
+"""Initial speeds that can be dealt with [m/s]."""
 
 
 def initial_state_of(state: Any) -> InitialState:
+    """Read a planning problem's initial state; of an interval, the middle.
+
+    Raises
+    ------
+    ScenarioError
+        If position, orientation or velocity are missing, the position is not exact, or a number is not
+        finite or out of range.
+    """
     values = []
     position = getattr(state, "position", None)
     if position is None or hasattr(position, "center") or hasattr(position, "shapes"):
@@ -44,17 +54,34 @@ def initial_state_of(state: Any) -> InitialState:
 
 
 def first_step_of(state: Any) -> int:
+    """Time step of a planning problem's initial state.
+
+    Raises
+    ------
+    ScenarioError
+        If there is none or it is out of range.
+    """
     step = getattr(state, "time_step", None)
     if step is None:
         raise ScenarioError("the planning problem's initial state has no time step")
     first = int(step.start if hasattr(step, "start") else step)
-    if not 0 <= first <= _STEPS_MAX:
+    if not 0 <= first <= STEPS_MAX:
         raise ScenarioError(f"the planning problem starts at time step {first}; CommonRoad counts from 0")
     return first
 
 
 def is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehicle) -> bool:
-    """Whether a moving obstacle starts where, how fast and about as large as the ego."""
+    """Whether a moving obstacle starts where, how fast and about as large as the ego.
+
+    Parameters
+    ----------
+    obstacle : commonroad.scenario.obstacle.DynamicObstacle
+    ego : InitialState
+    first_step : int
+        Time step at which the planning problem starts.
+    vehicle : Vehicle
+        The ego's.
+    """
     state = obstacle.state_at_time(first_step)
     if state is None or hasattr(state.position, "center") or hasattr(state.position, "shapes"):
         return False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -12,7 +12,7 @@ from repair.curves.base import Curve
 from repair.problem.problem import RepairProblem
 from repair.search.result import Probe
 
-__all__ = ["Budget", "OutOfTime", "ProblemSource", "TrajectoryChecker", "probe_sides", "relaxed"]
+__all__ = ["Budget", "OutOfTime", "ProblemSource", "TrajectoryChecker", "probe_sides"]
 
 
 class ProblemSource(Protocol):
@@ -20,6 +20,10 @@ class ProblemSource(Protocol):
 
     def at(self, t_rep: float) -> Sequence[RepairProblem]:
         """Problems in the order in which they should be tried; empty where no way is open."""
+        ...
+
+    def relaxed(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
+        """The problems again with smaller and smaller margins, for backends that keep theirs."""
         ...
 
 
@@ -37,6 +41,8 @@ class OutOfTime(Exception):
 
 @dataclass
 class Budget:
+    """What is left of a time limit."""
+
     limit: float | None
     begin: float
     clock: Callable[[], float]
@@ -44,10 +50,12 @@ class Budget:
 
     @property
     def left(self) -> float | None:
+        """Time left [s]; None without a limit."""
         return None if self.limit is None else max(self.limit - (self.clock() - self.begin), 0.0)
 
     @property
     def spent(self) -> bool:
+        """Nothing is left."""
         return self.left == 0.0
 
 
@@ -72,15 +80,15 @@ def probe_sides(
         begin = budget.clock()
         verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
         margin = problem.margin
-        closest = solve.stages.get("closest") if getattr(backend, "relaxes", False) else None
+        closest = solve.closest
         if solve.curve is None and closest is not None and not problem.strict:
             # The backend calls this infeasible, and so it stays; but boxes are wider than vehicles, and
             # the checker may accept the curve that comes closest.
-            again = checker.check(problem, closest)
+            again = checker.check(problem, closest.curve)
             if again.ok:
-                margin -= solve.residuals["obstacles"]
+                margin -= closest.miss
                 detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
-                solve, verdict = replace(solve, curve=closest, detail=detail), again
+                solve, verdict = replace(solve, curve=closest.curve, detail=detail), again
         maneuver = problem.passing.maneuver if problem.passing is not None else None
         name = maneuver.value if maneuver is not None else "follow"
         tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
@@ -105,14 +113,3 @@ def _better(new: Probe, old: Probe) -> bool:
 def _unsolved(solve: SolveResult, t_rep: float) -> Verdict:
     reason = Reason.NO_CORRIDOR if solve.status is SolveStatus.NO_CORRIDOR else Reason.NOT_SOLVED
     return Verdict((Violation(reason, t_rep, solve.detail or solve.status.sentence),))
-
-
-def relaxed(source: ProblemSource, backend: RepairBackend, t_rep: float) -> Iterator[Sequence[RepairProblem]]:
-    """Problems with smaller margins, for a backend that keeps its margin whatever it costs.
-
-    Boxes in (s, l) are wider than the vehicles in them; a hard backend would call a repair infeasible
-    that the checker, which looks at the true rectangles, accepts.
-    """
-    relaxed = getattr(source, "relaxed", None)
-    if relaxed is not None and getattr(backend, "relaxes", False):
-        yield from relaxed(t_rep)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator
 
-__all__ = ["Order", "probe_order"]
+from repair.errors import ConfigError
+from repair.registry import Registry
+from repair.timegrid import ROUNDING, intervals
+
+__all__ = ["RULES", "IsOpen", "Order", "Rule", "probe_order"]
 
 #: Yields the next t_rep [s], is sent whether it was feasible.
 Order = Generator[float, bool, None]
@@ -15,7 +18,7 @@ IsOpen = Callable[[float], bool]
 
 def _grid_size(end: float, delta_t: float) -> int:
     """Number of grid points k * delta_t in [0, end)."""
-    return max(0, math.ceil(end / delta_t - 1e-9))
+    return max(0, intervals(end, delta_t))
 
 
 def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
@@ -70,7 +73,7 @@ def _scan(end: float, delta_t: float, is_open: IsOpen) -> Order:
 
 def _as_printed(end: float, delta_t: float, is_open: IsOpen) -> Order:
     start, t_rep = 0.0, 0.0
-    while abs(end - start) > delta_t + 1e-12:
+    while abs(end - start) > delta_t + ROUNDING:
         if (yield t_rep):
             start = t_rep
         else:
@@ -78,12 +81,15 @@ def _as_printed(end: float, delta_t: float, is_open: IsOpen) -> Order:
         t_rep = 0.5 * (start + end)
 
 
-_RULES: dict[str, Callable[[float, float, IsOpen], Order]] = {
-    "guided": _guided,
-    "bisect": _bisect,
-    "scan": _scan,
-    "as_printed": _as_printed,
-}
+#: A rule makes the order of visits from the upper end, Delta T, and the guess at what is open.
+Rule = Callable[[float, float, IsOpen], Order]
+
+RULES: Registry[Rule] = Registry(
+    "search rule",
+    {"bisect": _bisect, "guided": _guided, "scan": _scan, "as_printed": _as_printed},
+    error=ConfigError,
+    group="repair.rules",
+)
 
 
 def probe_order(rule: str, end: float, delta_t: float, is_open: IsOpen = lambda t_rep: True) -> Order:
@@ -100,4 +106,4 @@ def probe_order(rule: str, end: float, delta_t: float, is_open: IsOpen = lambda 
         Whether a way past the obstacles is open at a t_rep [s]: a guess at feasibility that costs
         little. Only ``guided`` asks, and a wrong answer costs it probes, nothing else.
     """
-    return _RULES[rule](end, delta_t, is_open)
+    return RULES[rule](end, delta_t, is_open)

@@ -15,12 +15,12 @@ from repair.backend.base import RepairBackend
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve
 from repair.problem.problem import RepairProblem
-from repair.search.probe import Budget, OutOfTime, ProblemSource, TrajectoryChecker, probe_sides, relaxed
+from repair.search.probe import Budget, OutOfTime, ProblemSource, TrajectoryChecker, probe_sides
 from repair.search.result import Probe, SearchResult, SearchStatus
-from repair.search.rules import probe_order
+from repair.search.rules import Order, probe_order
 from repair.search.settings import SearchConfig
 
-__all__ = ["search_f_ttr"]
+__all__ = ["iter_probes", "search_f_ttr"]
 
 
 def iter_probes(
@@ -30,6 +30,7 @@ def iter_probes(
     end: float,
     settings: SearchConfig,
     clock: Callable[[], float] = time.perf_counter,
+    visits: Sequence[float] | None = None,
 ) -> Iterator[Probe]:
     """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
 
@@ -37,6 +38,8 @@ def iter_probes(
     ----------
     end : float
         Upper end of the search [s], excluded: the reference is in conflict there.
+    visits : sequence of float, optional
+        The t_rep to visit [s] instead, whatever comes out.
     """
     budget = Budget(settings.time_limit, clock(), clock)
     made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
@@ -47,7 +50,8 @@ def iter_probes(
         made[t_rep] = source.at(t_rep)
         return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
 
-    order = probe_order(settings.rule, end, settings.delta_t, is_open)
+    given = None if visits is None else _given(visits)
+    order = given or probe_order(settings.rule, end, settings.delta_t, is_open)
     warm_start: Curve | None = None
     answer: bool | None = None
     while True:
@@ -60,7 +64,9 @@ def iter_probes(
         budget.cut = False
         first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
         probe = probe_sides(t_rep, first, backend, checker, settings.sides, warm_start, budget)
-        for problems in relaxed(source, backend, t_rep):
+        # Boxes in (s, l) are wider than the vehicles in them; a hard backend would call a repair infeasible
+        # that the checker, which looks at the true rectangles, accepts.
+        for problems in source.relaxed(t_rep) if backend.capabilities.relaxes else ():
             if probe.feasible:
                 break
             if budget.spent:
@@ -69,12 +75,17 @@ def iter_probes(
             again = probe_sides(t_rep, problems, backend, checker, settings.sides, warm_start, budget)
             tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
             probe = replace(again if again.feasible else probe, tried=tried)
-        if probe.feasible:
+        if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
         answer = probe.feasible
         yield probe
         if budget.cut and not answer:
             raise OutOfTime  # nobody knows whether it would have been feasible
+
+
+def _given(visits: Sequence[float]) -> Order:
+    for t_rep in visits:
+        _ = yield t_rep  # an answer is sent, and not asked for; ``yield from`` would take none
 
 
 def search_f_ttr(
@@ -84,6 +95,7 @@ def search_f_ttr(
     checker: TrajectoryChecker,
     settings: SearchConfig,
     *,
+    visits: Sequence[float] | None = None,
     on_probe: Callable[[Probe], None] | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
@@ -97,6 +109,9 @@ def search_f_ttr(
     backend : RepairBackend
     checker : TrajectoryChecker
     settings : SearchConfig
+    visits : sequence of float, optional
+        The times-to-repair to try [s], instead of those of ``settings.rule``: the paper's baseline tries
+        one, the TTR.
     on_probe : callable, optional
         Called after every probe; an interrupt in between loses nothing that was found.
     clock : callable
@@ -119,7 +134,7 @@ def search_f_ttr(
     probes: list[Probe] = []
     complete = True
     try:
-        for probe in iter_probes(source, backend, checker, end, settings, clock):
+        for probe in iter_probes(source, backend, checker, end, settings, clock, visits):
             probes.append(probe)
             if on_probe is not None:
                 on_probe(probe)

@@ -1,88 +1,133 @@
 """Backends by name; a module is imported when its backend is asked for.
 
-A fourth backend is one module and one line here (or :func:`register` from outside).
+A further backend is one module and one line here, or :func:`register` from outside, or an entry point of
+an installed package: group ``repair.backends``, each a :class:`repair.backend.base.BackendSpec`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from importlib import import_module
+from typing import Any
 
-from repair.backend.base import RepairBackend
-from repair.config import Config
+from repair.backend.base import BackendSpec, Capabilities, Configuration, RepairBackend
+from repair.baselines.qptr.settings import QptrConfig
 from repair.errors import BackendError
+from repair.registry import Registry, loaded
+from repair.solvers.casadi.settings import CasadiConfig
+from repair.solvers.ego.settings import EgoConfig
 
-__all__ = ["available", "backend_names", "make_backend", "register"]
+__all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
 
-#: name -> (module, factory in it, packages it needs, one line for people)
-_BACKENDS: dict[str, tuple[str, str, tuple[str, ...], str]] = {
-    "ego": (
-        "repair.solvers.ego.backend",
-        "make",
-        ("scipy",),
-        "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
-    ),
-    "casadi": (
-        "repair.solvers.casadi.backend",
-        "make",
-        ("casadi",),
-        "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
-    ),
-    "qptr": (
-        "repair.baselines.qptr.backend",
-        "make",
-        ("qpsolvers",),
-        "Bernstein QP in a convex driving corridor (baseline)",
-    ),
-}
-_EXTRA: dict[str, Callable[[Config], RepairBackend]] = {}
+BACKENDS: Registry[BackendSpec] = Registry(
+    "backend",
+    {
+        "ego": BackendSpec(
+            "repair.solvers.ego.backend:make",
+            EgoConfig,
+            ("scipy",),
+            "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
+        ),
+        "casadi": BackendSpec(
+            "repair.solvers.casadi.backend:make",
+            CasadiConfig,
+            ("casadi",),
+            "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
+        ),
+        "qptr": BackendSpec(
+            "repair.baselines.qptr.backend:make",
+            QptrConfig,
+            ("qpsolvers",),
+            "Bernstein QP in a convex driving corridor (baseline)",
+        ),
+    },
+    error=BackendError,
+    group="repair.backends",
+)
 
 
-def register(name: str, factory: Callable[[Config], RepairBackend]) -> None:
-    """Add a backend of your own for this process; ``factory(config)`` makes it."""
-    _EXTRA[name] = factory
+def register(
+    name: str,
+    factory: Callable[[Any], RepairBackend] | BackendSpec,
+    *,
+    settings: type | None = None,
+    says: str = "registered by the program",
+) -> None:
+    """Add a backend of your own for this process.
+
+    Parameters
+    ----------
+    name : str
+    factory : callable or BackendSpec
+        ``factory(config)`` makes the backend.
+    settings : type, optional
+        Dataclass of its own section of the configuration; its instance is ``config.section(name)``.
+    says : str
+        One line for people.
+
+    Raises
+    ------
+    BackendError
+        If the name is taken, or the settings are no dataclass.
+    """
+    spec = factory if isinstance(factory, BackendSpec) else BackendSpec(factory, settings, (), says)
+    if spec.settings is not None and not is_dataclass(spec.settings):
+        raise BackendError(f"the settings of backend {name!r} have to be a dataclass, not {spec.settings!r}")
+    BACKENDS.register(name, spec)
 
 
 def backend_names() -> tuple[str, ...]:
     """All names that :func:`make_backend` knows."""
-    return (*_BACKENDS, *_EXTRA)
+    return BACKENDS.names()
+
+
+def sections() -> dict[str, type]:
+    """The sections that the backends bring to the configuration, by name."""
+    return {name: spec.settings for name, spec in BACKENDS.items() if spec.settings is not None}
 
 
 def available() -> dict[str, str | None]:
     """For each backend, None if it can be made, else the sentence that says what is missing."""
-    state: dict[str, str | None] = dict.fromkeys(_EXTRA)
-    for name, (module, _, packages, _) in _BACKENDS.items():
-        state[name] = None
-        for needed in (*packages, module):
-            try:
-                import_module(needed)
-            except ImportError as error:
-                state[name] = f"{needed} cannot be imported: {error}"
-                break
-    return state
+    state: dict[str, str | None] = {name: _missing(spec) for name, spec in BACKENDS.items()}
+    return {**state, **{name: f"it cannot be loaded: {why}" for name, why in BACKENDS.broken().items()}}
+
+
+def _missing(spec: BackendSpec) -> str | None:
+    module = spec.factory.partition(":")[0] if isinstance(spec.factory, str) else None
+    for needed in (*spec.needs, *([module] if module else ())):
+        try:
+            import_module(needed)
+        except ImportError as error:
+            return f"{needed} cannot be imported: {error}"
+    return None
 
 
 def describe(name: str) -> str:
     """One line about a backend."""
-    return _BACKENDS[name][3] if name in _BACKENDS else "registered by the program"
+    return BACKENDS[name].says
 
 
-def make_backend(name: str, config: Config) -> RepairBackend:
+def make_backend(name: str, config: Configuration) -> RepairBackend:
     """Make a backend from its section of the configuration.
 
     Raises
     ------
     BackendError
-        If the name is unknown, or what it needs is not installed (the sentence names it).
+        If the name is unknown, what it needs is not installed (the sentence names it), or what its
+        factory gives is no backend.
     """
-    if name in _EXTRA:
-        return _EXTRA[name](config)
-    if name not in _BACKENDS:
-        raise BackendError(f"backend {name!r} is unknown; there are {', '.join(backend_names())}")
-    module, factory, packages, _ = _BACKENDS[name]
-    for needed in packages:
+    spec = BACKENDS[name]
+    for needed in spec.needs:
         try:
             import_module(needed)
         except ImportError as error:
             raise BackendError(f"backend {name!r} needs the package {needed}: {error}") from error
-    return getattr(import_module(module), factory)(config)  # type: ignore[no-any-return]
+    made = loaded(spec.factory)(config)
+    if not callable(getattr(made, "solve", None)):
+        raise BackendError(f"backend {name!r}: its factory gave {type(made).__name__}, no backend")
+    if not isinstance(getattr(made, "capabilities", None), Capabilities):
+        raise BackendError(
+            f"backend {name!r} declares no capabilities; it needs an attribute capabilities = Capabilities()"
+        )
+    return made

@@ -48,14 +48,17 @@ class SweepSettings:
 
 
 def combinations(settings: SweepSettings) -> list[tuple[str, str]]:
+    """Backend and reference of every row of a file."""
     return [(backend, reference) for reference in settings.references for backend in settings.backends]
 
 
 def failed_row(file: str, backend: str, reference: str, status: str, detail: str) -> dict[str, Any]:
+    """The row of what could not be run, with the reason."""
     row: dict[str, Any] = dict.fromkeys(COLUMNS)
     row.update(file=file, backend=backend, reference=reference, status=status, detail=detail)
     return row
 
 
 def one_line(error: BaseException) -> str:
+    """An error's own words, on one line and not too long."""
     return " ".join(str(error).split())[:300]

@@ -21,10 +21,7 @@ def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
         config = load_config(settings.preset, overrides=settings.overrides)
         scene = load_scene(
             path,
-            planning_problem=config.scene.planning_problem,
-            vehicle=config.scene.vehicle,
-            horizon=config.scene.horizon,
-            after_prediction=config.scene.after_prediction,
+            config,
         )
     except RepairError as error:
         return [
@@ -48,7 +45,6 @@ def _row(
 ) -> dict[str, Any]:
     from repair.api import search
     from repair.baselines.evasive.times import evasive_ttr
-    from repair.io.result_json import to_dict
     from repair.prepare import prepare
     from repair.search.result import SearchStatus
     from repair.solvers.registry import make_backend
@@ -59,7 +55,7 @@ def _row(
     prepared = prepare(scene, config)
     prepared_in = time.perf_counter() - begin
     result = search(prepared, make_backend(backend, config))
-    content = to_dict(result)
+    content = result.to_dict()
     evasive = evasive_ttr(prepared, config.evasive)
     best = result.search.best
     failing = result.search.probes[0] if best is None and result.search.probes else None
@@ -104,10 +100,9 @@ def _why(probe: Any) -> str:
 def _certificate(result: Any) -> str:
     """``ok``, or the margins that are violated."""
     from repair.certify.recompute import certify
-    from repair.save import save
 
     with tempfile.TemporaryDirectory() as folder:
-        save(result, Path(folder), figure=False)
+        result.save(folder, figure=False)
         certificate = certify(Path(folder))
     return "; ".join(row.name for row in certificate.rows if not row.ok) or "ok"
 
@@ -124,9 +119,8 @@ def _official(result: Any) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "solution.xml"
         file.write_bytes(CommonRoadSolutionWriter(result.to_solution()).dump().encode())
-        own = () if scene.recorded_ego is None else (scene.recorded_ego.id,)
         problems = PlanningProblemSet([scene.planning_problem])
-        verdict = check_solution_file(file, scene.scenario, problems, without=own)
+        verdict = check_solution_file(file, scene.official(), problems)
     return {
         "official_feasible": verdict.feasible,
         "official_collision_free": verdict.collision_free,

@@ -1,4 +1,4 @@
-"""The drivability checker's kinematic single-track (KS) model: its states, its word on single transitions."""
+"""CommonRoad's kinematic single-track (KS) model: its states, and the drivability checker's word on them."""
 
 from __future__ import annotations
 
@@ -90,6 +90,13 @@ def to_ks_states(states: DrivenStates, initial_time_step: int) -> list[Any]:
 
     Values are plain floats (the solution writer then writes them so that reading gives the same
     numbers); orientations are brought into [-pi, pi], as CommonRoad demands.
+
+    Parameters
+    ----------
+    states : DrivenStates
+        At the scenario's time steps.
+    initial_time_step : int
+        That of the first state.
     """
     from commonroad.scenario.state import KSState
 

@@ -1,4 +1,4 @@
-"""Kinematic single-track states along a driven path, and whether the vehicle can drive them.
+"""Kinematic single-track states along a driven path.
 
 The model is CommonRoad's KS model (Althoff and Würsching, *CommonRoad: Vehicle Models*, 2020),
 referenced to the rear axle; CommonRoad states are referenced to the centre of the vehicle, ``rear``
@@ -8,9 +8,7 @@ the body, the slip angle at the centre is beta = theta - psi, and
     tan(beta) = b / L * tan(delta)                     (no slip at the wheels)
     d(psi)/d(sigma) = sin(beta) / b                    (sigma: arc length driven forward)
 
-The drivability checker's own test runs an optimiser on every transition (6 to 14 ms each).
-:func:`direct_check` answers in microseconds for transitions that are clearly drivable;
-:func:`repair.vehicle.commonroad_ks.official_check` asks the drivability checker about the rest.
+Whether the vehicle can drive from state to state is for :mod:`repair.vehicle.transitions` to say.
 """
 
 from __future__ import annotations
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
 __all__ = ["body_angles", "drive", "driven_states"]
+
 # Samples at least this far apart [m] are those of a moving vehicle.
 _MOVES = 1e-9
 # Factors as arrays, because NumPy takes long to convert a plain number.
@@ -76,7 +75,20 @@ def drive(
 
 
 def body_angles(path: CartesianPath, vehicle: Vehicle, slip0: float | None = None) -> tuple[Array, Array]:
-    """Slip angle and orientation (K,) [rad] along a path; ``slip0`` and rules as in :func:`drive`."""
+    """Slip angle and orientation along a path in the plane, by the rules of :func:`drive`.
+
+    Parameters
+    ----------
+    path : CartesianPath
+    vehicle : Vehicle
+    slip0 : float, optional
+        Slip angle at the first sample [rad], as in :func:`drive`.
+
+    Returns
+    -------
+    slip, orientation : (K,) array
+        [rad]
+    """
     return _angles(path.heading, path.speed, path.step, path.turn, path.slowest, vehicle.rear, slip0)
 
 
@@ -99,7 +111,16 @@ def _angles(
 def driven_states(
     t: Array, xy: Array, speed: Array, slip: Array, orientation: Array, vehicle: Vehicle
 ) -> DrivenStates:
-    """States at samples of which :func:`body_angles` gave the angles: all of them, or every n-th."""
+    """States at samples of which :func:`body_angles` gave the angles: all of them, or every n-th.
+
+    Parameters
+    ----------
+    t, xy, speed : array
+        As in :func:`drive`.
+    slip, orientation : (K,) array
+        [rad]
+    vehicle : Vehicle
+    """
     steering = np.arctan(vehicle.wheelbase / vehicle.rear * np.tan(slip))
     return DrivenStates(t, xy[:, 0], xy[:, 1], steering, speed * np.cos(slip), orientation)
 

@@ -1,4 +1,4 @@
-"""Which transitions of the single-track model are clearly drivable, each held against every limit.
+"""Which transitions of the single-track model are clearly drivable: each held against every limit.
 
 The drivability checker's own test runs an optimiser on every transition (6 to 14 ms each).
 :func:`direct_check` answers in microseconds for transitions that are clearly drivable;
@@ -25,6 +25,8 @@ __all__ = [
     "ENGINE",
     "FAR_OUT",
     "LIMITS",
+    "ORIENTATION_TOLERANCE",
+    "POSITION_TOLERANCE",
     "STEERING_RATE",
     "KinematicReport",
     "direct_check",
@@ -105,10 +107,9 @@ def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> Kinematic
     """
     delta, v = states.steering, states.speed
     acceleration = np.diff(v) / dt
-    # vehiclemodels: above v_switch the engine's power limits the acceleration; the limit falls over
-    # the step, so the speed at its end decides.
-    engine = vehicle.a_max * np.minimum(1.0, vehicle.v_switch / np.maximum(v[1:], vehicle.v_switch))
-    lateral = v[:-1] ** 2 * np.tan(delta[:-1]) / vehicle.wheelbase
+    # The engine's limit falls over a step on which the vehicle gains speed: the speed at its end decides.
+    engine = vehicle.engine_acceleration(v[1:])
+    lateral = vehicle.lateral_acceleration(v[:-1], delta[:-1])
     overshoot = 2.0 * v[1:] - v[:-1]  # the optimiser's: see ENGINE
     fastest, slowest = np.maximum(v[:-1], overshoot), np.minimum(v[:-1], overshoot)
     position, orientation = transition_errors(states, dt, vehicle)
@@ -135,7 +136,21 @@ def direct_check(states: DrivenStates, dt: float, vehicle: Vehicle) -> Kinematic
 
 
 def transition_errors(states: DrivenStates, dt: float, vehicle: Vehicle) -> tuple[Array, Array]:
-    """Error of the simulated next state: of the rear axle's position (larger axis) and the orientation."""
+    """By how much the next states miss the simulated ones.
+
+    Parameters
+    ----------
+    states : DrivenStates
+        At the scenario's time steps, T of them.
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
+
+    Returns
+    -------
+    position, orientation : (T - 1,) array
+        Of the rear axle, along the axis on which it is larger [m]; and of the body [rad].
+    """
     psi, delta = states.orientation, states.steering
     most = dt * STEERING_RATE * vehicle.steering_rate_max
     change = np.minimum(np.maximum(delta[1:] - delta[:-1], -most), most)

@@ -1,4 +1,7 @@
-"""The fast twin of :mod:`repair.vehicle.transitions`: bounds over a whole trajectory."""
+"""The fast twin of :mod:`repair.vehicle.transitions`: bounds over a whole trajectory.
+
+Nearly all trajectories that are good are good by these bounds too; the exact form is asked about the rest.
+"""
 
 from __future__ import annotations
 
@@ -30,18 +33,21 @@ _SURE = 1.0 - 1e-9
 def clearly_drivable(
     xy: Array, speed: Array, slip: Array, orientation: Array, dt: float, vehicle: Vehicle
 ) -> bool:
-    """Whether :func:`direct_check` accepts every transition: True implies it, False says nothing.
+    """Whether :func:`repair.vehicle.transitions.direct_check` accepts every transition.
 
-    Bounds over the whole trajectory stand in for those of the single transitions, and the trapezoidal
-    rule, with a bound of its error, for Simpson's: this leaves few calls, and nearly all trajectories
-    that are good are good by these as well.
+    True implies it, False says nothing. Bounds over the whole trajectory stand in for those of the single
+    transitions, and the trapezoidal rule, with a bound of its error, for Simpson's: this leaves few calls.
 
     Parameters
     ----------
     xy : (T, 2) array
         The vehicle's centre [m] at the scenario's time steps.
     speed, slip, orientation : (T,) array
-        Speed of the centre [m/s], slip angle and orientation [rad]; see :func:`driven_states`.
+        Speed of the centre [m/s], slip angle and orientation [rad]; see
+        :func:`repair.vehicle.single_track.driven_states`.
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
     """
     _, steering, top, acceleration, friction, position, angle = ACCEPTED
     rows = np.zeros((5, len(slip)))
@@ -53,6 +59,7 @@ def clearly_drivable(
     low, high = np.minimum.reduce(rows, axis=1).tolist(), np.maximum.reduce(rows, axis=1).tolist()
     largest = fastest, steepest, turn, dv, dtangent = list(map(max, high, map(neg, low)))
     engine = acceleration * vehicle.a_max
+    # As Vehicle.engine_acceleration has it, on plain numbers.
     if fastest > vehicle.v_switch:
         engine = ENGINE * vehicle.a_max * vehicle.v_switch / fastest
     to_steering = vehicle.wheelbase / vehicle.rear  # from the slip angle's tangent; atan has slope <= 1
@@ -79,7 +86,7 @@ def clearly_drivable(
 def _error_bounds(
     xy: Array, rows: Array, psi: Array, largest: Sequence[float], dt: float, vehicle: Vehicle
 ) -> tuple[float, float]:
-    """Bounds of what :func:`transition_errors` gives: of the position and of the orientation.
+    """Bounds of what ``transition_errors`` gives: of the position and of the orientation.
 
     The trapezoidal rule stands in for Simpson's. What the two differ by, at most, is added: each term
     is half a step's second difference of a factor, a product of two changes, or follows from these.

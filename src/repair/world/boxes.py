@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, frozen
+from repair.timegrid import STEP
 
 __all__ = ["Occupancy"]
-
 
 _KEPT = 1000  # times of a query whose places among the steps are kept
 
@@ -27,7 +27,7 @@ def _steps_at(
     """
     where = (np.frombuffer(times) - start) / step
     nearest = np.rint(where)
-    off_step = np.abs(where - nearest) >= 1e-6
+    off_step = np.abs(where - nearest) >= STEP
     where = np.where(off_step, where, nearest)
     below = np.floor(where)
     low = below.astype(np.intp)

@@ -1,4 +1,6 @@
-"""Collision with obstacles, for the ego's oriented rectangle; the edge of the road is in ``road.py``.
+"""Collision of the ego's oriented rectangle with obstacles.
+
+The edge of the road is for :mod:`repair.world.road`.
 
 The verdicts are at least as strict as those of the drivability checker
 (``commonroad_dc.feasibility.solution_checker``), which looks at scenario steps only. The tests are
@@ -8,7 +10,7 @@ the project's own (separating axes in numpy): they need no build and name obstac
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
 __all__ = ["CollisionWorld", "Contact"]
+
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
 
@@ -39,7 +42,8 @@ class CollisionWorld:
     """The obstacles over time, built once, asked many times.
 
     Rectangles and circles are interpolated between the scenario steps (centre, heading and size linear
-    in time). Sets and polygons hold over the intervals on both sides of their step.
+    in time). Sets and polygons hold over the intervals on both sides of their step. Obstacles for which the
+    drivability checker is late are tested both where they are and, at scenario steps, where it puts them.
 
     Parameters
     ----------
@@ -53,9 +57,6 @@ class CollisionWorld:
         Index of the last scenario step.
     substeps : int
         Samples per scenario step.
-    shifts : mapping, optional
-        Obstacle id -> steps by which the drivability checker is late (:func:`official_shifts`). Such
-        obstacles are tested both where they are and, at scenario steps, where the checker puts them.
     """
 
     def __init__(
@@ -65,20 +66,19 @@ class CollisionWorld:
         dt: float,
         n_steps: int,
         substeps: int = 4,
-        shifts: Mapping[int, int] | None = None,
     ) -> None:
         self.dt = dt
         self.substeps = substeps
         self.n_samples = n_steps * substeps + 1
         self._obstacles = tuple(obstacles)
-        self._half = np.array((0.5 * vehicle.length, 0.5 * vehicle.width))
+        self._half = np.array((vehicle.half_length, vehicle.half_width))
         self._diagonal = np.array(complex(*self._half))  # an array for the reason that CLOCKWISE is one
         sample = np.arange(self.n_samples)
         self._before = sample // substeps
         self._after = -(-sample // substeps)
-        self._build(shifts or {}, float(np.hypot(*self._half)))
+        self._build(vehicle.radius)
 
-    def _build(self, shifts: Mapping[int, int], ego_radius: float) -> None:
+    def _build(self, ego_radius: float) -> None:
         """Tabulate every shape's pose and reach over the samples.
 
         Columns are tracks: an obstacle gives one, or two where it is held over intervals or where the
@@ -102,7 +102,7 @@ class CollisionWorld:
                 add(index, rows[self._after], what, self._after)
             else:
                 add(index, self._interpolate(rows), what, self._before)
-            shift = shifts.get(obstacle.id, 0) if obstacle.role != "static" else 0
+            shift = obstacle.late
             if shift:
                 late = self._before - shift
                 track = rows[np.clip(late, 0, len(rows) - 1)]
@@ -172,8 +172,18 @@ class CollisionWorld:
     def contact_along(
         self, here: Points, orientation: Array, start: int = 0, step: float | None = None
     ) -> Contact | None:
-        """As :meth:`contact`, of centres x + iy (K,); ``step`` [m] is the longest between two, if known."""
-        found = self._first(here, orientation, start, step)
+        """As :meth:`contact`, of centres that are complex numbers already.
+
+        Parameters
+        ----------
+        here : (K,) complex array
+            Centres x + iy [m].
+        orientation, start
+            As in :meth:`contact`.
+        step : float, optional
+            The longest way from one sample to the next [m], if it is known.
+        """
+        found = self.first_contact(here, orientation, start, step)
         if found is None:
             return None
         k, index = found
@@ -203,10 +213,25 @@ class CollisionWorld:
             velocity = speed * np.array([np.cos(heading), np.sin(heading)])
         return centre, velocity
 
-    def _first(
-        self, here: Points, orientation: Array, start: int, step: float | None = None
+    def first_contact(
+        self,
+        here: Points,
+        orientation: Array,
+        start: int = 0,
+        step: float | None = None,
+        *,
+        all_pairs: bool = False,
     ) -> tuple[int, int] | None:
-        """Sample (counted from ``start``) and obstacle index of the first collision."""
+        """Which sample, counted from ``start``, is the first to touch an obstacle, and which obstacle it is.
+
+        Parameters
+        ----------
+        here, orientation, start, step
+            As in :meth:`contact_along`.
+        all_pairs : bool
+            Hold every sample against every shape, without the look at blocks of samples that mostly
+            settles it. This is slow, and the definition of what the look at blocks must find.
+        """
         stop = start + len(here)
         if start < 0 or stop > self.n_samples:
             raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
@@ -218,7 +243,7 @@ class CollisionWorld:
             raise ValueError("the ego's poses are not finite")
         if step is None:
             step = float(np.abs(here[1:] - here[:-1]).max(initial=0.0))
-        ego, row = self._near(here, start, step)
+        ego, row = self._everything(len(here), start) if all_pairs else self._near(here, start, step)
         if not len(ego):
             return None
         axis = np.exp(orientation.take(ego) * CLOCKWISE)
@@ -253,6 +278,11 @@ class CollisionWorld:
         away -= size // 2 * step
         block, track = (away <= self._block_reach[blocks]).nonzero()
         return samples.take(block, axis=0).ravel(), rows.take(block, axis=0).ravel() + track.repeat(size)
+
+    def _everything(self, count: int, start: int) -> tuple[Index, Index]:
+        """As :meth:`_near`, nothing left out."""
+        ego, track = np.indices((count, len(self._kind))).reshape(2, -1)
+        return ego, (ego + start) * len(self._kind) + track
 
     def _polygons_touch(self, k: int, m: int, pose: tuple[float, float, float, float]) -> bool:
         """Whether the ego at ``x, y, cos, sin`` meets a polygon of a track at a sample."""

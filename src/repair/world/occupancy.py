@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
+from repair.timegrid import INSTANT
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
@@ -95,11 +96,20 @@ def shrink_to_start(
     """Take back so much of the margin of an obstacle that the ego does not start inside of it.
 
     A start within the margin but without contact is not a collision yet; without this, nothing
-    could ever be repaired from there. Obstacles in ``touching`` (true contact) keep their margin.
+    could ever be repaired from there.
+
+    Parameters
+    ----------
+    start : (2,) array
+        Where the ego starts, ``[s, l]`` [m].
+    touching : set of int
+        Obstacles in true contact with it, which keep their margin.
 
     Returns
     -------
-    Occupancy, notes
+    Occupancy
+    notes : tuple of str
+        What was taken back.
     """
     lower, upper = occupancy.lower[:, 0], occupancy.upper[:, 0]
     inside = (lower < start) & (start < upper)
@@ -160,8 +170,8 @@ def relevant(occupancy: Occupancy, t_start: float, t_end: float, reach: Array, l
     if not len(occupancy):
         return occupancy
     last_step = len(occupancy.t) - 1
-    first = max(int(occupancy.t.searchsorted(t_start + 1e-9, side="right")) - 1, 0)
-    last = min(int(occupancy.t.searchsorted(t_end - 1e-9, side="left")), last_step)
+    first = max(int(occupancy.t.searchsorted(t_start + INSTANT, side="right")) - 1, 0)
+    last = min(int(occupancy.t.searchsorted(t_end - INSTANT, side="left")), last_step)
     if last > first:
         kept = near(occupancy.swept[:, :, first:last], reach, l_room)
     else:  # a single step, at which the boxes are what they are

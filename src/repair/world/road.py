@@ -21,13 +21,15 @@ if TYPE_CHECKING:
 
 __all__ = ["RoadBoundary", "grouping"]
 
-
 # A prepared geometry must not be asked by two threads at once, and shapely lets other threads run.
 _PREPARED = Lock()
 # The rectangle may come this close to the edge [m] only where the exact test says so.
 _TOUCH = 1e-6
-# Consecutive poses are put into one box over about this distance [m] (RoadBoundary).
+# Consecutive poses are put into one box over about this distance [m], and so many at most.
 _BOX = 4.0
+_MOST = 32
+# The corners of a box with sides (back, right, front, left).
+_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
 
 class RoadBoundary:
@@ -45,52 +47,62 @@ class RoadBoundary:
         Only read.
     vehicle : Vehicle
         The ego.
+
+    Attributes
+    ----------
+    region : shapely geometry
+        The road.
+    spare : float
+        More than the rounding of any coordinate of the region [m].
     """
 
     def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
         import shapely
 
         self._scenario = scenario
-        self._corners = 0.5 * np.array(
-            [[vehicle.length, vehicle.width], [-vehicle.length, vehicle.width],
-             [-vehicle.length, -vehicle.width], [vehicle.length, -vehicle.width]]
-        )  # fmt: skip
+        self._corners = vehicle.corners
         outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
         self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
         shapely.prepare(self.region)
-        # More than the rounding of any coordinate of the region.
         self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
 
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
         """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
 
+        :meth:`surely_inside` settles most poses; asked exactly are the others.
+
         Parameters
         ----------
         x, y, orientation : (K,) array
             Centre [m] and orientation [rad] of the ego.
         """
-        known = self._surely_inside(x, y, orientation)
+        known = self.surely_inside(x, y, orientation)
         if known.all():
             return None
         unsure = np.flatnonzero(~known)
-        inside = self._inside(self._outline(x[unsure], y[unsure], orientation[unsure]))
+        inside = self.inside(self.outline(x[unsure], y[unsure], orientation[unsure]))
         return None if inside.all() else int(unsure[np.argmin(inside)])
 
-    def _inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
-        """Whether polygons (K, V, 2) lie properly inside of the region."""
+    def inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
+        """Whether outlines (K, V, 2) lie properly inside of the road: exact, and safe among threads."""
         import shapely
 
         polygons = shapely.polygons(outlines)
         with _PREPARED:
             return np.asarray(shapely.contains_properly(self.region, polygons))
 
-    def _surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
+    def surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
         """Poses (K,) that lie inside because a larger box does; False says nothing.
 
         One box, turned like the pose in its middle, holds several consecutive poses: asking about
         boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
         a pose turned by an angle t reaches farther, at most size * |t|.
+
+        Parameters
+        ----------
+        x, y, orientation : (K,) array
+            Centre [m] and orientation [rad] of the ego.
         """
         count = len(x)
         known = np.zeros(count, dtype=np.bool_)
@@ -113,12 +125,15 @@ class RoadBoundary:
         sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
         corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
         corners = corners * axis[:, None] + origin[:, None]
-        inside = self._inside(corners.view(np.float64).reshape(-1, 4, 2))
+        inside = self.inside(corners.view(np.float64).reshape(-1, 4, 2))
         known[pose[:, inside] if not inside.all() else slice(None)] = True
         return known
 
-    def _outline(self, x: Array, y: Array, orientation: Array) -> Array:
-        """Corners of the ego's rectangle, (K, 4, 2); far off any road for a pose that is not finite."""
+    def outline(self, x: Array, y: Array, orientation: Array) -> Array:
+        """Corners of the ego's rectangle (K, 4, 2) at poses (K,), anticlockwise [m].
+
+        Far off any road for a pose that is not finite: whoever asks where it lies is told "outside".
+        """
         cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
         forward, left = self._corners[:, 0], self._corners[:, 1]
         corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
@@ -136,7 +151,7 @@ class RoadBoundary:
         import shapely
 
         hits = self._triangles.query(
-            shapely.polygons(self._outline(x, y, orientation)), predicate="intersects"
+            shapely.polygons(self.outline(x, y, orientation)), predicate="intersects"
         )
         return int(hits[0].min()) if hits.size else None
 
@@ -156,11 +171,6 @@ class RoadBoundary:
                 corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
                 self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
         return self._triangles is not False
-
-
-# Consecutive poses in one box at most, and the corners of a box with sides (back, right, front, left).
-_MOST = 32
-_AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
 
 @lru_cache(maxsize=256)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["RoadCorridor"]
 
-
 # Cells of a corridor: one about every _CELL metres, for poses up to _ALONG before or behind its middle;
 # edges farther than _ASIDE from the axis are not looked for.
 _CELL = 1.0
@@ -43,18 +42,17 @@ class RoadCorridor:
     """
 
     def __init__(self, road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle) -> None:
-        self._half_length, half_width = np.array(0.5 * vehicle.length), 0.5 * vehicle.width
-        diagonal = float(np.hypot(self._half_length, half_width))
+        self._half_length = np.array(vehicle.half_length)
         count = max(round(frame.length / _CELL), 1)
         s = np.linspace(0.0, frame.length, count + 1)
         self._inverse, self._last = np.array(count / frame.length), np.array(float(count))
         heading = frame.heading(s)
         axis = np.exp(1j * heading)
         middle = np.ascontiguousarray(frame.position(s)).view(np.complex128)[:, 0]
-        right, left = _room(road.region, middle, axis, _ALONG + diagonal + road.spare)
+        right, left = _room(road.region, middle, axis, _ALONG + vehicle.radius + road.spare)
         # Seen from the band's middle, both sides are alike.
         self._place = np.array((middle + 0.5j * (left + right) * axis, axis.conj()))
-        self._room = np.array((heading, 0.5 * (left - right) - half_width - road.spare))
+        self._room = np.array((heading, 0.5 * (left - right) - vehicle.half_width - road.spare))
 
     def holds(self, s: Array, centre: Points, orientation: Array) -> npt.NDArray[np.bool_]:
         """Poses (K,) that are surely on the road; False says nothing.

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, Points
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["CLOCKWISE", "TOUCH", "polygon_touches", "rectangles_touch"]
 
@@ -57,7 +52,17 @@ def _reached(shapes: Points, half: Points) -> npt.NDArray[np.bool_]:
 
 
 def polygon_touches(polygon: Array, pose: tuple[float, float, float, float], half: Array) -> bool:
-    """Whether the ego at ``x, y, cos, sin`` meets a convex polygon (V, 2): separating axes."""
+    """Whether the ego meets a convex polygon: separating axes.
+
+    Parameters
+    ----------
+    polygon : (V, 2) array
+        Its corners, in either direction, closed or not [m].
+    pose : tuple
+        Of the ego: ``x, y`` [m] and ``cos, sin`` of its orientation.
+    half : (2,) array
+        Half length and half width of the ego [m].
+    """
     x, y, cos, sin = pose
     points = (polygon - (x, y)) @ np.array([[cos, -sin], [sin, cos]])  # seen from the ego
     if (points.min(axis=0) > np.add(half, TOUCH)).any() or (points.max(axis=0) < -np.add(half, TOUCH)).any():

@@ -13,18 +13,24 @@ from repair.arrays import Array, Points
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
 
-__all__ = ["CIRCLE", "POLYGON", "RECTANGLE", "as_complex", "block_samples", "shape_rows"]
+__all__ = ["CIRCLE", "POLYGON", "RECTANGLE", "Index", "as_complex", "block_samples", "shape_rows"]
 
 Index = npt.NDArray[np.intp]
-
+"""Places in an array."""
 
 RECTANGLE, CIRCLE, POLYGON = range(3)
 
 
 def shape_rows(obstacle: Obstacle) -> tuple[int, Array]:
-    """What an obstacle is made of, and (T, 5) ``x, y, heading, half length, half width``.
+    """What an obstacle is made of, and its size and place over time.
 
-    Circles, and the circumcircles of polygons, have their radius as half length.
+    Returns
+    -------
+    kind : int
+        ``RECTANGLE``, ``CIRCLE`` or ``POLYGON``.
+    rows : (T, 5) array
+        ``x, y, heading, half length, half width``; circles, and the circumcircles of polygons, have
+        their radius as both halves.
     """
     if obstacle.rectangles is not None:
         return RECTANGLE, np.asarray(obstacle.rectangles)
@@ -45,10 +51,16 @@ def shape_rows(obstacle: Obstacle) -> tuple[int, Array]:
 
 @lru_cache(maxsize=256)
 def block_samples(start: int, stop: int, size: int, tracks: int) -> tuple[Index, Index, Index]:
-    """Of each block of ``size`` samples that meets [start, stop): its middle (n, 1), its samples (n, size).
+    """Blocks of ``size`` samples that meet [start, stop).
 
-    Counted from ``start`` on; the first and the last of [start, stop) stand for those outside. Also where
-    the samples' rows of ``tracks`` shapes each begin.
+    Returns
+    -------
+    middle : (n, 1) array
+        The sample in the middle of each, counted from ``start`` on.
+    samples : (n, size) array
+        All of them, counted likewise; the first and the last of [start, stop) stand for those outside.
+    rows : (n, size) array
+        Where the samples' rows begin, of ``tracks`` shapes each.
     """
     samples = np.arange(start // size * size, -(-stop // size) * size).reshape(-1, size) - start
     samples = np.minimum(np.maximum(samples, 0), max(stop - start - 1, 0))

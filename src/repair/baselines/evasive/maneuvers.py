@@ -87,7 +87,23 @@ def maneuvers_at(
     settings: EvasiveConfig,
     vehicle: Vehicle,
 ) -> Sequence[EvasiveCurve]:
-    """The variants of a manoeuvre from ``t_start`` on: one along the path, or one for each offset."""
+    """The variants of a manoeuvre: one along the path, or one for each offset.
+
+    Parameters
+    ----------
+    reference : Curve
+        Until ``t_start`` it is followed, and its path is kept or left.
+    t_start, t_end : float
+        Span of the manoeuvre [s].
+    maneuver : EvasiveManeuver
+    settings : EvasiveConfig
+    vehicle : Vehicle
+
+    Returns
+    -------
+    sequence of EvasiveCurve
+        Empty where the vehicle cannot steer: a kinematic one that stands.
+    """
     path_s, path_l = _path_of(reference, t_end)
     state = reference.sample([t_start])
     s, v = float(state.position[0, 0]), max(float(state.velocity[0, 0]), 0.0)
@@ -129,7 +145,7 @@ def _kick_down(
     phases: list[tuple[float, ...]] = []
     t = 0.0
     while t < duration - 1e-9:
-        a = min(a_kick, vehicle.a_max * min(1.0, vehicle.v_switch / max(v, 1e-9)))
+        a = min(a_kick, float(vehicle.engine_acceleration(v)))
         a = max(0.0, min(a, (vehicle.v_max - v) / _ENGINE_STEP))
         phases.append((t, s, v, a))
         t, s, v = t + _ENGINE_STEP, s + v * _ENGINE_STEP + 0.5 * a * _ENGINE_STEP**2, v + a * _ENGINE_STEP
@@ -138,14 +154,11 @@ def _kick_down(
 
 
 def _steering(v: float, settings: EvasiveConfig, vehicle: Vehicle) -> tuple[float, float]:
-    """Lateral acceleration and jerk [m/s², m/s³] at speed ``v``; the jerk of a point mass is unlimited.
-
-    The single-track model gives v**2 tan(delta) / L, with delta and its rate limited.
-    """
+    """Lateral acceleration and jerk [m/s², m/s³] at speed ``v``; the jerk of a point mass is unlimited."""
     if settings.model == "point_mass":
         return settings.a_steer, float("inf")
-    strongest = v**2 * np.tan(vehicle.steering_max) / vehicle.wheelbase
-    return min(settings.a_steer, float(strongest)), v**2 * vehicle.steering_rate_max / vehicle.wheelbase
+    strongest = float(vehicle.lateral_acceleration(v, vehicle.steering_max))
+    return min(settings.a_steer, strongest), vehicle.lateral_jerk(v)
 
 
 def _swerve(offset: float, acceleration: float, jerk: float) -> list[tuple[float, ...]]:

@@ -13,15 +13,14 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from repair.baselines.evasive.maneuvers import EvasiveCurve, EvasiveManeuver, maneuvers_at
 from repair.baselines.evasive.settings import EvasiveConfig
 from repair.curves.base import SplicedCurve
+from repair.timegrid import INSTANT, intervals
 from repair.world.occupancy import first_entry
 
 if TYPE_CHECKING:
-    from repair.situation import Prepared
+    from repair.situation import Situation
 
 __all__ = ["EvasiveResult", "EvasiveStatus", "evasive_ttr"]
 
@@ -78,34 +77,32 @@ class EvasiveResult:
         return None if self.maneuver is None else self.curves.get(self.maneuver)
 
 
-def evasive_ttr(prepared: Prepared, settings: EvasiveConfig | None = None) -> EvasiveResult:
-    """TTB, TTK, TTS and TTR of a prepared scene's reference.
+def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
+    """TTB, TTK, TTS and TTR of a reference.
 
     Parameters
     ----------
-    prepared : repair.api.Prepared
-    settings : EvasiveConfig, optional
-        By default those of the prepared scene's configuration.
+    situation : Situation
+    settings : EvasiveConfig
 
     Returns
     -------
     EvasiveResult
         Each time is the last scenario step before the TTC from which the manoeuvre avoids every
-        collision until the end of the repairs (``prepared.t_end``).
+        collision until the end of the repairs (``situation.t_end``).
     """
-    settings = settings or prepared.config.evasive
-    ttc = prepared.conflict.time
+    ttc = situation.conflict.time
     if ttc == float("inf"):
         return _uniform(EvasiveStatus.NO_CONFLICT)
-    if prepared.conflict.contact_time <= 0.0:
+    if situation.conflict.contact_time <= 0.0:
         return _uniform(EvasiveStatus.ALREADY_COLLIDING)
-    latest = max(int(np.ceil(ttc / prepared.scene.dt - 1e-6)) - 1, 0)
+    latest = max(intervals(ttc, situation.scene.dt) - 1, 0)
     times: dict[EvasiveManeuver, float] = {}
     curves: dict[EvasiveManeuver, EvasiveCurve] = {}
     for maneuver in EvasiveManeuver:
         times[maneuver] = -float("inf")
         for step in range(latest, -1, -1):
-            curve = _escape(prepared, settings, maneuver, step * prepared.scene.dt)
+            curve = _escape(situation, settings, maneuver, step * situation.scene.dt)
             if curve is not None:
                 times[maneuver], curves[maneuver] = curve.t_start, curve
                 break
@@ -121,30 +118,33 @@ def _uniform(status: EvasiveStatus) -> EvasiveResult:
 
 
 def _escape(
-    prepared: Prepared, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float
+    situation: Situation, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float
 ) -> EvasiveCurve | None:
     """The first variant of a manoeuvre from ``t`` on that is free until the end of the repairs."""
     steering = maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT)
-    road = steering or prepared.conflict.kind == "off_road"
+    road = steering or situation.conflict.kind == "off_road"
     for curve in maneuvers_at(
-        prepared.reference, t, prepared.t_end, maneuver, settings, prepared.scene.vehicle
+        situation.reference, t, situation.t_end, maneuver, settings, situation.scene.vehicle
     ):
-        if _is_free(prepared, curve, settings.collision, road):
+        if _is_free(situation, curve, settings.collision, road):
             return curve
     return None
 
 
-def _is_free(prepared: Prepared, curve: EvasiveCurve, collision: str, road: bool) -> bool:
-    checker = prepared.checker
-    driven = SplicedCurve(prepared.reference, curve, curve.t_start)
+def _is_free(situation: Situation, curve: EvasiveCurve, collision: str, road: bool) -> bool:
+    checker = situation.checker
+    driven = SplicedCurve(situation.reference, curve, curve.t_start)
     if collision == "boxes":
-        times = checker.times(prepared.t_end)
-        if first_entry(prepared.occupancy, driven.sample(times[times >= curve.t_start - 1e-9])) is not None:
+        times = checker.times(situation.t_end)
+        if (
+            first_entry(situation.occupancy, driven.sample(times[times >= curve.t_start - INSTANT]))
+            is not None
+        ):
             return False
-    elif checker.contact(driven, prepared.t_end) is not None:
+    elif checker.contact(driven, situation.t_end) is not None:
         return False
     if not road or checker.road is None:
         return True
-    states = checker.drive(driven, prepared.t_end)
-    late = states.t >= curve.t_start - 1e-9
+    states = checker.drive(driven, situation.t_end)
+    late = states.t >= curve.t_start - INSTANT
     return checker.road.first_off_road(states.x[late], states.y[late], states.orientation[late]) is None

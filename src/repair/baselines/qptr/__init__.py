@@ -1,0 +1,1 @@
+"""The paper's baseline: a quadratic program of Bernstein pieces in a convex corridor."""

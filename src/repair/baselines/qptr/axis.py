@@ -1,4 +1,4 @@
-"""All of one axis' QP that depends on neither start, reference nor corridor."""
+"""The QP of one axis: what its free vector moves, and the bounds that the limits give."""
 
 from __future__ import annotations
 
@@ -101,7 +101,23 @@ def axis_qp(
     w_jerk: float,
     w_deviation: float,
 ) -> AxisQp:
-    """Sideways the repair comes to rest, so as to end parallel to the path; along it the end is free."""
+    """The QP of an axis, kept for the next one like it.
+
+    Sideways the repair comes to rest, so as to end parallel to the path; along it the end is free.
+
+    Parameters
+    ----------
+    axis : int
+        0 for s, 1 for l.
+    limits : Limits
+    pieces : int
+    duration : float
+        Of a piece [s].
+    degree, continuity : int
+        Of the pieces, and how many derivatives do not jump at the joints.
+    w_jerk, w_deviation : float
+        Weights of the objective.
+    """
     s = qp_structure(pieces, degree, duration, continuity, w_jerk, w_deviation, axis == 1)
     pull = 2.0 * w_deviation * s.at_nodes.T * s.weights
     given = np.hstack([s.lift, np.zeros_like(pull)])  # control points of the task with z = 0 at their origin

@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from repair.arrays import Array
-from repair.backend.base import SolveResult, SolveStatus
+from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.baselines.qptr.axis import FAMILIES, AxisQp, axis_qp
-from repair.baselines.qptr.corridor import NoCorridor, build_corridor, time_grid
+from repair.baselines.qptr.corridor import NoCorridor, build_corridor
 from repair.baselines.qptr.qp import solve_projection
 from repair.baselines.qptr.qp_trial import require_solver
 from repair.baselines.qptr.settings import QptrConfig
-from repair.config import Config
+from repair.baselines.qptr.time_grid import time_grid
 from repair.curves.base import Curve
 from repair.curves.bernstein import BernsteinCurve
 from repair.errors import BackendError
@@ -69,6 +69,7 @@ class QptrBackend:
     """
 
     name = "qptr"
+    capabilities = Capabilities()
 
     def __init__(self, config: QptrConfig | None = None) -> None:
         self.config = config or QptrConfig()
@@ -194,6 +195,6 @@ def _solution(
     return curve, objective, dict(zip(FAMILIES, worst.tolist(), strict=True))
 
 
-def make(config: Config) -> QptrBackend:
+def make(config: Configuration) -> QptrBackend:
     """The backend as the configuration describes it."""
-    return QptrBackend(config.qptr)
+    return QptrBackend(config.section("qptr"))

@@ -21,7 +21,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.backend.base import SolveStatus
 from repair.baselines.qptr.qp_residuals import combined, duality_gap, violation_of
-from repair.baselines.qptr.qp_solvers import call_solver, daqp_frame
+from repair.baselines.qptr.qp_solvers import SolverCall, call_solver, daqp_frame
 
 __all__ = ["QpAnswer", "infeasibility", "proven_violation", "solve_projection"]
 
@@ -45,7 +45,13 @@ class QpAnswer(NamedTuple):
 
 
 def solve_projection(
-    rows: Array, lower: Array, upper: Array, solver: str, time_limit: float | None = None
+    rows: Array,
+    lower: Array,
+    upper: Array,
+    solver: str,
+    time_limit: float | None = None,
+    *,
+    call: SolverCall = call_solver,
 ) -> QpAnswer:
     """The point z next to the origin with ``lower <= rows @ z <= upper``.
 
@@ -59,6 +65,8 @@ def solve_projection(
         Any name that qpsolvers knows here.
     time_limit : float, optional
         Wall time [s], for the solvers that take one.
+    call : SolverCall
+        How the solver is called; whatever it says is judged all the same.
     """
     if time_limit is not None and time_limit <= 0.0:
         return QpAnswer(SolveStatus.TIME_LIMIT, None, np.inf, "no time left")
@@ -68,7 +76,7 @@ def solve_projection(
     # daqp reads on from the first number, whatever the strides are.
     rows, lower, upper = np.ascontiguousarray(rows), np.ascontiguousarray(lower), np.ascontiguousarray(upper)
     try:
-        raw = call_solver(rows, lower, upper, solver, time_limit)
+        raw = call(rows, lower, upper, solver, time_limit)
     except Exception as error:  # the solvers' own exceptions have no common base
         return QpAnswer(
             SolveStatus.NUMERICAL_ERROR, None, np.inf, f"{solver}: {type(error).__name__}: {error}"

@@ -1,9 +1,10 @@
-"""The QP solvers, each in its own words."""
+"""The QP solvers, each in its own words: daqp and OSQP directly, all others through qpsolvers."""
 
 from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -13,10 +14,13 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.baselines.qptr.qp_residuals import RawAnswer, duality_gap, violation_of
 
-__all__ = ["RawAnswer", "call_solver", "daqp_frame"]
+__all__ = ["OSQP_TOLERANCES", "SETTINGS", "SolverCall", "call_solver", "daqp_frame", "osqp_answer"]
 
-# Tolerances well below what the checker can see; the defaults of the first-order methods are not.
-_SETTINGS: dict[str, dict[str, Any]] = {
+#: ``rows, lower, upper, solver, time_limit`` to what the solver says of ``min |z|^2 / 2`` between the bounds.
+SolverCall = Callable[[Array, Array, Array, str, float | None], RawAnswer]
+
+#: By solver. Tolerances well below what the checker can see; the defaults of the first-order methods are not.
+SETTINGS: dict[str, dict[str, Any]] = {
     "osqp": {
         "eps_prim_inf": 1e-7,
         "max_iter": 50_000,
@@ -27,7 +31,8 @@ _SETTINGS: dict[str, dict[str, Any]] = {
     "clarabel": {"tol_feas": 1e-9, "tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9},
     "daqp": {"primal_tol": 1e-8, "dual_tol": 1e-10},
 }
-_OSQP_TOLERANCES = tuple({"eps_abs": e, "eps_rel": 0.01 * e} for e in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6))
+#: Those of OSQP, one after the other.
+OSQP_TOLERANCES = tuple({"eps_abs": e, "eps_rel": 0.01 * e} for e in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6))
 #: Violation and relative gap of an answer that further iterations cannot better.
 _EXACT = 1e-8
 _TIMED = ("osqp", "clarabel", "daqp")
@@ -45,14 +50,26 @@ _DAQP_WORDS = {
 
 
 def call_solver(rows: Array, lower: Array, upper: Array, solver: str, time_limit: float | None) -> RawAnswer:
-    """``min |z|^2 / 2`` subject to ``lower <= rows @ z <= upper``, as the solver answers it."""
-    settings = dict(_SETTINGS.get(solver, {}))
+    """``min |z|^2 / 2`` subject to ``lower <= rows @ z <= upper``, as the solver answers it.
+
+    Parameters
+    ----------
+    rows : (r, m) array
+        Of unit norm, C-contiguous.
+    lower, upper : (r,) array
+        May be infinite.
+    solver : str
+        Any name that qpsolvers knows here.
+    time_limit : float or None
+        Wall time [s], for the solvers that take one.
+    """
+    settings = dict(SETTINGS.get(solver, {}))
     if time_limit is not None and solver in _TIMED:
         settings["time_limit"] = time_limit
     if solver == "daqp":
         return _daqp(rows, lower, upper, settings)
     if solver == "osqp":
-        return _osqp(rows, lower, upper, settings)
+        return osqp_answer(rows, lower, upper, settings)
     return _qpsolvers(rows, lower, upper, solver, settings)
 
 
@@ -70,11 +87,26 @@ def _daqp(rows: Array, lower: Array, upper: Array, settings: dict[str, Any]) -> 
     return RawAnswer(z if flag > 0 else None, info["lam"], _DAQP_WORDS.get(flag, f"exit flag {flag}"))
 
 
-def _osqp(rows: Array, lower: Array, upper: Array, settings: dict[str, Any]) -> RawAnswer:
+def osqp_answer(
+    rows: Array,
+    lower: Array,
+    upper: Array,
+    settings: Mapping[str, Any],
+    tolerances: Sequence[Mapping[str, float]] = OSQP_TOLERANCES,
+) -> RawAnswer:
     """OSQP, with tolerances that tighten until its polishing has the right constraints active.
 
     From then on the answer is exact and further iterations gain nothing; that is often long before
     the iterates themselves are close. A new solver each time: the answer depends on nothing else.
+
+    Parameters
+    ----------
+    rows, lower, upper
+        See :func:`call_solver`.
+    settings : mapping
+        OSQP's own, ``time_limit`` among them where there is one.
+    tolerances : sequence of mappings
+        Settings that replace each other, at least one.
     """
     import osqp
     from scipy.sparse import csc_matrix, eye
@@ -82,7 +114,7 @@ def _osqp(rows: Array, lower: Array, upper: Array, settings: dict[str, Any]) -> 
     begin = time.perf_counter()
     m = rows.shape[1]
     solver = osqp.OSQP()
-    first, *others = _OSQP_TOLERANCES
+    first, *others = tolerances
     solver.setup(eye(m, format="csc"), np.zeros(m), csc_matrix(rows), lower, upper, **{**settings, **first})
     answer = solver.solve(raise_error=False)
     for tighter in others:

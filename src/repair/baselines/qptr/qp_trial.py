@@ -9,6 +9,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.backend.base import SolveStatus
 from repair.baselines.qptr.qp import solve_projection
+from repair.baselines.qptr.qp_solvers import SolverCall, call_solver
 from repair.baselines.qptr.structure import qp_structure
 from repair.errors import BackendError
 
@@ -21,7 +22,7 @@ def braking_problem(gap: float) -> tuple[Array, Array, Array]:
     Returns
     -------
     rows, lower, upper
-        See :func:`solve_projection`; the origin is the optimum without constraints.
+        See :func:`repair.baselines.qptr.qp.solve_projection`; the origin is the optimum without constraints.
     """
     pieces, degree = 6, 5
     structure = qp_structure(pieces, degree, 0.5, 2, 1.0, 0.1)
@@ -48,10 +49,10 @@ _KNOWN: dict[float, float | None] = {13.0: None, 13.7: None, 13.85: 88.7392, 14.
 
 
 @lru_cache(maxsize=32)
-def objection(solver: str) -> str | None:
-    """Why a solver cannot be trusted, from problems of known answer; None if it can."""
+def objection(solver: str, call: SolverCall = call_solver) -> str | None:
+    """Why a solver, called in this way, cannot be trusted, from problems of known answer; None if it can."""
     for gap, optimum in _KNOWN.items():
-        answer = solve_projection(*braking_problem(gap), solver)
+        answer = solve_projection(*braking_problem(gap), solver, call=call)
         if optimum is None:
             if answer.status is not SolveStatus.INFEASIBLE:
                 return (
@@ -66,8 +67,15 @@ def objection(solver: str) -> str | None:
     return None
 
 
-def require_solver(solver: str) -> None:
+def require_solver(solver: str, call: SolverCall = call_solver) -> None:
     """Refuse a solver that is not there or that does not give the known answers.
+
+    Parameters
+    ----------
+    solver : str
+        Any name that qpsolvers knows here.
+    call : SolverCall
+        How it is called.
 
     Raises
     ------
@@ -79,6 +87,6 @@ def require_solver(solver: str) -> None:
     if solver not in available_solvers:
         known = ", ".join(sorted(available_solvers)) or "none"
         raise BackendError(f"qptr.solver is {solver!r}, which qpsolvers does not find here; it finds {known}")
-    why = objection(solver)
+    why = objection(solver, call)
     if why is not None:
         raise BackendError(f"qptr.solver {solver!r} is refused: {why}")

@@ -150,7 +150,16 @@ def qp_structure(
 ) -> QpStructure:
     """Structure for one axis, objective ``w_jerk * int(jerk**2) + w_deviation * int((x - ref)**2)``.
 
-    With ``settles`` the speed and the acceleration at the end are zero.
+    Parameters
+    ----------
+    pieces, degree : int
+    duration : float
+        Of a piece [s].
+    continuity : int
+        How many derivatives do not jump at the joints.
+    w_jerk, w_deviation : float
+    settles : bool
+        Speed and acceleration at the end are zero.
     """
     h, unit = duration, _unit(pieces, degree, continuity, settles)
     state = np.array([1.0, h, h**2])  # a speed of 1 is one of h per unit of time

@@ -1,8 +1,4 @@
-"""The types that travel through the house, in the order in which they are made.
-
-SI units throughout, float64, arrays read-only. ``N`` obstacles, ``T`` time steps,
-``K`` samples; the last axis of a two-column array is ``[s, l]``.
-"""
+"""The room to the left and right of a path: where its normals cross lanelets, and which of these count."""
 
 from __future__ import annotations
 
@@ -18,12 +14,23 @@ from repair.scene.road.lanes import Lane
 
 __all__ = ["LaneletCrossings", "LateralBounds", "crossings", "lateral_bounds"]
 
+_REACH = 20.0  # half length of the normals [m]
+_GAP = 0.2  # lanelets this close count as connected [m]
+_ALONG = 0.5  # cos of the largest angle between lanes of the same direction
+
 
 @dataclass(frozen=True)
 class LateralBounds:
     """Where the ego's *reference point* may be sideways, tabulated over s.
 
     ``right[k] <= l <= left[k]`` at ``s[k]``; half the ego's width is already taken off.
+
+    Attributes
+    ----------
+    s : (M,) array
+        Arc lengths of the table [m], increasing.
+    right, left : (M,) array
+        Smallest (<= 0) and largest (>= 0) offset [m].
     """
 
     s: Array
@@ -36,16 +43,22 @@ class LateralBounds:
         return np.interp(query, self.s, self.right), np.interp(query, self.s, self.left)
 
 
-_REACH = 20.0  # half length of the normals [m]
-_GAP = 0.2  # lanelets this close count as connected [m]
-_ALONG = 0.5  # cos of the largest angle between lanes of the same direction
-
-
 @dataclass(frozen=True)
 class LaneletCrossings:
-    """Where the frame's normals cross lanelets: normal ``row`` is inside ``lanelet`` for low < l < high.
+    """Where the frame's normals cross lanelets.
 
-    ``along`` tells whether that lanelet runs in the frame's direction there.
+    Attributes
+    ----------
+    s : (M,) array
+        Arc lengths at which the normals stand [m].
+    row : (C,) int array
+        Which of them is the normal of a crossing.
+    lanelet : (C,) int array
+        The lanelet that it crosses,
+    low, high : (C,) array
+        and from which offset to which [m].
+    along : (C,) bool array
+        Whether the lanelet runs in the frame's direction there.
     """
 
     s: Array
@@ -57,7 +70,16 @@ class LaneletCrossings:
 
 
 def crossings(frame: FrenetFrame, lanes: Mapping[int, Lane], *, spacing: float = 1.0) -> LaneletCrossings:
-    """Cut every drivable lanelet with the frame's normals (shapely, all at once)."""
+    """Cut every drivable lanelet with the frame's normals (shapely, all at once).
+
+    Parameters
+    ----------
+    frame : FrenetFrame
+    lanes : mapping
+        The map's lanes by id.
+    spacing : float
+        Distance of the normals, at most [m].
+    """
     import shapely
 
     s = np.linspace(0.0, frame.length, max(int(np.ceil(frame.length / spacing)), 1) + 1)
@@ -94,6 +116,7 @@ def crossings(frame: FrenetFrame, lanes: Mapping[int, Lane], *, spacing: float =
 
 
 def _runs_along(center: Array, points: Array, tangent: Array) -> npt.NDArray[np.bool_]:
+    """Whether a centre line runs along the tangents (K, 2), each seen from the point (K, 2) next to it."""
     step = np.diff(center, axis=0)
     length = np.hypot(step[:, 0], step[:, 1])
     step, start = step[length > 1e-6], center[:-1][length > 1e-6]

@@ -10,20 +10,28 @@ from repair.arrays import Array
 from repair.scene.road.lanes import Lane, locate
 
 __all__ = ["BEHIND", "centre_line", "cut_line", "direction_at"]
+
 BEHIND = 45.0  # centre line behind the ego [m]
 _FAR = 450.0  # centre line ahead of the ego at most [m]
 
 
 def direction_at(line: Array, end: int, sign: float) -> float:
+    """Direction [rad] in which a polyline arrives at one of its points.
+
+    Parameters
+    ----------
+    line : (M, 2) array
+    end : int
+        Index of the point; negative: the last one.
+    sign : float
+        1, or -1 where the line is listed against the direction of travel.
+    """
     end = len(line) - 1 if end < 0 else end
     for start in range(end - 1, -1, -1):
         step = sign * (line[end] - line[start])
         if np.hypot(*step) > 1e-3:
             return float(np.arctan2(step[1], step[0]))
     return 0.0
-
-
-# ---------------------------------------------------------------------- centre line
 
 
 def _append(line: list[Array], points: Array) -> None:
@@ -53,6 +61,17 @@ def _changed(here: Array, there: Array, distance: float) -> Array:
 
 
 def centre_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float) -> Array:
+    """Centre line (M, 2) along a chain of lanelets.
+
+    Parameters
+    ----------
+    chain : sequence of int
+        Ids; of two neighbours in it the second follows the first, or lies beside it.
+    lanes : mapping
+        The map's lanes by id.
+    change : float
+        Length of a change by one lane [m].
+    """
     line: list[Array] = []
     k = 0
     while k < len(chain):
@@ -66,7 +85,14 @@ def centre_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float) 
 
 
 def cut_line(line: Array, position: Array) -> tuple[Array, bool]:
-    """The part of a centre line around the ego, and whether its far end was cut off."""
+    """The part of a centre line around the ego, and whether its far end was cut off.
+
+    Parameters
+    ----------
+    line : (M, 2) array
+    position : (2,) array
+        Of the ego [m].
+    """
     chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     here = locate(line, position)[0]
     low, high = max(here - 2.0 * BEHIND, 0.0), min(here + _FAR, float(chord[-1]))

@@ -15,9 +15,6 @@ from repair.scene.traffic.shapes import FAR
 __all__ = ["goal_areas", "goal_groups", "point_of"]
 
 
-# ---------------------------------------------------------------------- graph
-
-
 def goal_areas(goal: Any) -> list[Any]:
     """The goal's positions as shapely polygons.
 
@@ -59,6 +56,7 @@ def goal_groups(goal: Any, lanes: Mapping[int, Lane]) -> list[set[int]]:
 
 
 def point_of(position: Array) -> Any:
+    """A position (2,) as a shapely point."""
     import shapely
 
     return shapely.Point(position)

@@ -11,16 +11,29 @@ from repair.arrays import Array, frozen
 from repair.errors import ScenarioError
 from repair.scene.traffic.shapes import FAR
 
-__all__ = ["Lane", "lanes_of"]
+__all__ = ["Lane", "lanes_of", "locate", "wrap"]
+
 _NOT_FOR_CARS = frozenset({"sidewalk", "bicycleLane", "crosswalk", "busStop", "border"})
 
 
 @dataclass(frozen=True)
 class Lane:
-    """A lanelet with what routing needs; neighbours of the same direction only.
+    """A lanelet with what routing needs.
 
-    ``center``, ``left`` and ``right`` are (M, 2) arrays; ``drivable`` is False for sidewalks and
-    their like.
+    Attributes
+    ----------
+    id : int
+    center, left, right : (M, 2) array
+        Centre line and bounds [m].
+    length : float
+        Of the centre line [m].
+    successors, predecessors : tuple of int
+    neighbours : tuple of int
+        Those of the same direction only.
+    drivable : bool
+        False for sidewalks and their like.
+    polygon : shapely geometry
+        The area.
     """
 
     id: int
@@ -36,7 +49,14 @@ class Lane:
 
 
 def lanes_of(network: Any) -> tuple[dict[int, Lane], list[str]]:
-    """Read the lanelets of a CommonRoad network; returns them by id, and notes on those left out.
+    """Read the lanelets of a CommonRoad network.
+
+    Returns
+    -------
+    lanes : dict
+        By id.
+    notes : list of str
+        Which lanelets were left out, and why.
 
     Raises
     ------
@@ -91,7 +111,13 @@ def wrap(angle: Any) -> Any:
 
 
 def locate(line: Array, point: Array) -> tuple[float, float, float]:
-    """Arc length, lateral offset and heading of a polyline at the point of it nearest to ``point``."""
+    """Where the point of a polyline (M, 2) that is nearest to ``point`` (2,) lies.
+
+    Returns
+    -------
+    arc, offset, heading : float
+        Arc length along the line [m], offset of ``point`` (left positive) [m], heading there [rad].
+    """
     start, step = line[:-1], np.diff(line, axis=0)
     square = np.maximum(np.sum(step**2, axis=1), 1e-12)
     along = np.clip(np.sum((point - start) * step, axis=1) / square, 0.0, 1.0)

@@ -50,6 +50,7 @@ class Route:
 
 
 def _graph(lanes: Mapping[int, Lane]) -> Any:
+    """The drivable lanes as a graph whose edges weigh what they cost to drive [m]."""
     import networkx
 
     graph = networkx.DiGraph()
@@ -189,12 +190,24 @@ def plan_route(
     speed: float,
     ahead: float,
 ) -> Route:
-    """Plan from a pose to a goal region.
+    """Plan a route from a pose to a goal region.
 
     The start is the lanelet that matches the heading best and leads to the goal. Without a goal
     position, or if it cannot be reached, the route goes straight on. Lane changes are made as
     early as possible; the first one is left to the lead-in from the ego's pose. The route runs on
     past the goal until ``ahead`` [m] of road lie before the ego.
+
+    Parameters
+    ----------
+    lanes : mapping
+        The map's lanes by id.
+    position : (2,) array
+        Of the ego [m].
+    heading, speed : float
+        Of the ego [rad], [m/s].
+    goal : commonroad.planning.goal.GoalRegion
+    ahead : float
+        Road that is wanted before the ego [m].
 
     Raises
     ------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from repair.arrays import Array
 
@@ -35,6 +36,10 @@ class Obstacle:
         the above; otherwise empty.
     states : (T, 4) array
         ``x, y, heading, speed``; for an occupancy without a state its centre and NaN.
+    late : int
+        By how many steps the drivability checker is late for it (:mod:`repair.scene.traffic.late`).
+    source
+        The CommonRoad obstacle that it was made from; None where there is none.
     """
 
     id: int
@@ -45,6 +50,8 @@ class Obstacle:
     circles: Array | None
     polygons: tuple[tuple[Array, ...], ...]
     states: Array
+    late: int = 0
+    source: Any = field(default=None, repr=False, compare=False)
 
     @property
     def n_steps(self) -> int:

@@ -16,22 +16,20 @@ checker count its states instead of reading their time steps, and would put the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from repair.errors import ConfigError, ScenarioError
+from repair.scene.settings import AFTER_PREDICTION
+from repair.scene.traffic.late import steps_late
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import obstacle_of_rows, require_sane
-from repair.scene.traffic.shapes import (
-    Placed,
-    occupied,
-)
+from repair.scene.traffic.shapes import Placed, occupied
 from repair.scene.traffic.timeline import continued, headings_of, state_occupancy, steps_of, timeline
 
-__all__ = ["AFTER_PREDICTION", "last_predicted_step", "obstacles_of"]
-
-AFTER_PREDICTION = ("remove", "hold", "constant_velocity")
+__all__ = ["last_predicted_step", "obstacles_of"]
 
 
 def _all(scenario: Any) -> list[Any]:
@@ -42,7 +40,12 @@ def _all(scenario: Any) -> list[Any]:
 
 
 def last_predicted_step(scenario: Any) -> int | None:
-    """Last time step at which any moving obstacle is predicted; None where nothing moves."""
+    """Last time step at which any moving obstacle is predicted; None where nothing moves.
+
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+    """
     last = []
     for obstacle in _all(scenario):
         prediction = getattr(obstacle, "prediction", None)
@@ -83,7 +86,11 @@ def obstacles_of(
 
     Returns
     -------
-    obstacles, recorded ego (or None), notes
+    obstacles : tuple of Obstacle
+        All but the ego's own recording and those that are never there.
+    recorded ego : Obstacle or None
+    notes : list of str
+        What was taken for granted or left out.
 
     Raises
     ------
@@ -109,14 +116,15 @@ def obstacles_of(
         if isinstance(placed, Placed):
             if role == "dynamic":
                 notes.append(f"obstacle {name} has no prediction and is taken to stand still")
-            found.append(obstacle_of_rows(name, kind, role, [placed], n_steps + 1))
+            still = obstacle_of_rows(name, kind, role, [placed], n_steps + 1)
+            found.append(replace(still, source=obstacle))
             continue
         rows = [placed.get(first_step + k) for k in range(n_steps + 1)]
         rows = continued(rows, placed, first_step, after_prediction, float(scenario.dt))
         if not any(row is not None for row in rows):
             notes.append(f"obstacle {name} is never there within the horizon")
             continue
-        made = obstacle_of_rows(name, kind, role, rows)
+        made = replace(obstacle_of_rows(name, kind, role, rows), late=steps_late(obstacle), source=obstacle)
         if role == "dynamic" and ego is None and is_ego(obstacle):
             ego = made
             notes.append(f"obstacle {name} is the ego's own recording and is left out")

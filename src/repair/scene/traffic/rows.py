@@ -10,14 +10,10 @@ import numpy as np
 from repair.arrays import Array, frozen
 from repair.errors import ScenarioError
 from repair.scene.traffic.obstacle import Obstacle
-from repair.scene.traffic.shapes import (
-    FAR,
-    Placed,
-    polygons_of,
-    subdivided,
-)
+from repair.scene.traffic.shapes import FAR, Placed, polygons_of, subdivided
 
 __all__ = ["obstacle_of_rows", "repeated", "require_sane"]
+
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
 
@@ -47,7 +43,17 @@ def _outline_rows(rows: Sequence[Placed | None]) -> Array:
 def obstacle_of_rows(
     name: int, kind: str, role: str, rows: Sequence[Placed | None], static_rows: int = 0
 ) -> Obstacle:
-    """Stack rows into an obstacle; a single row is repeated ``static_rows`` times without copying."""
+    """Stack placed occupancies into an obstacle.
+
+    Parameters
+    ----------
+    name, kind, role
+        Id, type and role of the obstacle.
+    rows : sequence of Placed or None
+        One per step; None where it is absent, but not everywhere.
+    static_rows : int
+        So often a single row is repeated, without copying it; 0 for what moves.
+    """
     present = [row for row in rows if row is not None]
     rectangles = circles = None
     polygons: tuple[tuple[Array, ...], ...] = ()
@@ -69,6 +75,8 @@ def obstacle_of_rows(
 
 
 def repeated(obstacle: Obstacle, count: int) -> Obstacle:
+    """The obstacle with its first row ``count`` times; the rows share one memory."""
+
     def wide(array: Array) -> Array:
         return np.broadcast_to(array[0], (count, *array.shape[1:]))
 
@@ -83,6 +91,13 @@ def repeated(obstacle: Obstacle, count: int) -> Obstacle:
 
 
 def require_sane(placed: Iterable[Placed]) -> None:
+    """Refuse occupancies that no obstacle can have.
+
+    Raises
+    ------
+    ScenarioError
+        If a number is not finite, or a size or place is beyond all reason; the obstacle is not named.
+    """
     for item in placed:
         places = [np.asarray(item.state[:2]), *(item.polygons or ())]
         places += [np.asarray(shape[:2]) for shape in (item.rectangle, item.circle) if shape]

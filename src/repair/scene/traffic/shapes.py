@@ -34,7 +34,19 @@ _CORNERS = 16  # of the polygon circumscribed about a circle
 
 
 class Placed(NamedTuple):
-    """One occupancy: exactly one of the three is set; and the state behind it."""
+    """One occupancy, and the state behind it.
+
+    Attributes
+    ----------
+    rectangle : tuple or None
+        ``x, y, heading, half length, half width``.
+    circle : tuple or None
+        ``x, y, radius``.
+    polygons : tuple of (m, 2) arrays, or None
+        Convex. Exactly one of the three is set.
+    state : tuple
+        ``x, y, heading, speed``; NaN for what is not known.
+    """
 
     rectangle: tuple[float, ...] | None
     circle: tuple[float, ...] | None
@@ -123,7 +135,16 @@ def outlines(shape: Any, position: Array, heading: float) -> list[Array]:
 
 
 def place(shape: Any, position: Array, heading: float, speed: float) -> Placed:
-    """A body shape at an exact pose."""
+    """A body shape at an exact pose.
+
+    Parameters
+    ----------
+    shape : commonroad.geometry.shape.Shape
+    position : (2,) array
+        [m]
+    heading, speed : float
+        [rad], [m/s]
+    """
     parts = _parts(shape)
     state = (float(position[0]), float(position[1]), heading, speed)
     part = parts[0]

@@ -10,15 +10,7 @@ import numpy as np
 
 from repair.arrays import Array
 from repair.errors import ScenarioError
-from repair.scene.traffic.shapes import (
-    Placed,
-    enclosing,
-    interval,
-    occupied,
-    outlines,
-    place,
-    union,
-)
+from repair.scene.traffic.shapes import Placed, enclosing, interval, occupied, outlines, place, union
 
 __all__ = [
     "STEPS_MAX",
@@ -32,12 +24,17 @@ __all__ = [
 ]
 
 STEPS_MAX = 10**9
-
-
-# ---------------------------------------------------------------------- states over time
+"""Time steps beyond this are an error in the file."""
 
 
 def position_of(state: Any) -> Array:
+    """Position (2,) of a CommonRoad state [m]; of an uncertain one the mean of its area's corners.
+
+    Raises
+    ------
+    ScenarioError
+        If it has none.
+    """
     position = getattr(state, "position", None)
     if position is None:
         raise ScenarioError("a state of it has no position")
@@ -79,6 +76,16 @@ def headings_of(states: Sequence[Any]) -> list[tuple[float, float]]:
 
 
 def state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Placed:
+    """What a body covers in a state: exactly, or what encloses every placement where it is uncertain.
+
+    Parameters
+    ----------
+    shape : commonroad.geometry.shape.Shape
+        The body.
+    state : commonroad.scenario.state.State
+    heading : tuple of float
+        Smallest and largest orientation [rad].
+    """
     forward, lateral = attribute_of(state, "velocity"), attribute_of(state, "velocity_y")
     speed = np.nan if forward is None else sum(interval(forward)) / 2.0
     if lateral is not None:
@@ -91,6 +98,13 @@ def state_occupancy(shape: Any, state: Any, heading: tuple[float, float]) -> Pla
 
 
 def steps_of(value: Any) -> tuple[int, int]:
+    """First and last time step that a time step or an interval of such reaches.
+
+    Raises
+    ------
+    ScenarioError
+        If one of them is beyond ``STEPS_MAX``.
+    """
     low, high = getattr(value, "start", value), getattr(value, "end", value)
     if not (abs(low) <= STEPS_MAX and abs(high) <= STEPS_MAX):
         raise ScenarioError(f"a time step of an obstacle is beyond {STEPS_MAX}")
@@ -98,9 +112,25 @@ def steps_of(value: Any) -> tuple[int, int]:
 
 
 def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], str]:
-    """Occupancies by the scenario's own time steps, and the role.
+    """Where a moving obstacle is, step by step, and its role.
 
-    Of an occupancy that holds over an interval, only the steps around ``first`` to ``last``.
+    Parameters
+    ----------
+    obstacle : commonroad.scenario.obstacle.Obstacle
+    first, last : int
+        Of an occupancy that holds over an interval, only the steps around these are taken.
+
+    Returns
+    -------
+    placed : dict
+        Scenario time step -> occupancy.
+    role : str
+        ``dynamic``, ``set_based`` or ``phantom``.
+
+    Raises
+    ------
+    ScenarioError
+        If its steps cannot be used: an interval at the start, a hole, or out of order.
     """
     prediction = getattr(obstacle, "prediction", None)
     initial = getattr(obstacle, "initial_state", None)
@@ -119,9 +149,8 @@ def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], s
         order = sorted(states)
         shape = obstacle.obstacle_shape
         for step, heading in zip(order, headings_of([states[k] for k in order]), strict=True):
-            if (
-                getattr(states[step], "hitch_angle", None) is not None
-            ):  # a trailer: commonroad-io knows how it trails
+            # A trailer: commonroad-io knows how it trails.
+            if getattr(states[step], "hitch_angle", None) is not None:
                 item = occupied(obstacle.occupancy_at_time(step).shape)
                 placed[step] = item._replace(state=state_occupancy(shape, states[step], heading).state)
             else:
@@ -153,13 +182,24 @@ def _check_order(steps: Sequence[tuple[int, int]], initial: Iterable[int]) -> No
             raise ScenarioError(f"its prediction goes from time step {high} to {following}")
 
 
-# ---------------------------------------------------------------------- arrays
-
-
 def continued(
     rows: list[Placed | None], timeline: dict[int, Placed], first: int, after: str, dt: float
 ) -> list[Placed | None]:
-    """Rows from step ``first`` on, continued past the last known one, also where that was earlier."""
+    """Rows from step ``first`` on, continued past the last known one, also where that was earlier.
+
+    Parameters
+    ----------
+    rows : list of Placed or None
+        What is known.
+    timeline : dict
+        Occupancies by time step, also those before ``first``.
+    first : int
+        Time step of the first row.
+    after : str
+        ``remove``, ``hold`` or ``constant_velocity``.
+    dt : float
+        Time step [s].
+    """
     known = [step for step in timeline if step < first + len(rows)]
     if after == "remove" or not known:
         return rows

@@ -33,32 +33,31 @@ from dataclasses import replace
 import numpy as np
 
 from repair.arrays import Array, frozen
-from repair.backend.base import SolveResult, SolveStatus
-from repair.config import Config
+from repair.backend.base import Capabilities, Closest, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
 from repair.curves.bases import n_points_for
 from repair.curves.bspline import UniformBSpline
-from repair.curves.fitting import fit_to_curve, splice_points
+from repair.curves.fitting import fit_to_curve
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
-from repair.solvers.casadi.guide import guide_of
-from repair.solvers.casadi.instance import ROAD_SLACK, TOLERANCE, Instance
-from repair.solvers.casadi.model import Model, build_model
+from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out
+from repair.solvers.casadi.model import TOLERANCE, build_model, status_of
+from repair.solvers.casadi.residuals import largest_violation, residuals_of, start_violation, worst_family
 from repair.solvers.casadi.rows import Structure
 from repair.solvers.casadi.separation import Separation, separate
 from repair.solvers.casadi.settings import CasadiConfig
-from repair.solvers.casadi.words import gap_of, largest_violation, missed, status_of, worst_family
+from repair.solvers.casadi.sides import open_sides
+from repair.timegrid import INSTANT
 
 __all__ = ["CasadiBackend", "make"]
 
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
-_SIDES = 4  # sets of sides that are tried
 
 
 class CasadiBackend:
     """Hard constraints through CasADi.
 
-    ``relaxes``: the search may ask again with a smaller margin, see ``repair.relax``.
+    The search may ask again with a smaller margin, see ``repair.relax``.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ class CasadiBackend:
     """
 
     name = "casadi"
-    relaxes = True
+    capabilities = Capabilities(relaxes=True, keeps_hull=True, uses_warm_start=True)
 
     def __init__(self, config: CasadiConfig | None = None, *, degree: int = 3, spacing: float = 0.2) -> None:
         self.config = config or CasadiConfig()
@@ -91,8 +90,8 @@ class CasadiBackend:
         _require(problem)
         deadline = None if time_limit is None else begin + time_limit
         try:
-            model = build_model(self._structure(problem, timed=time_limit is not None))
-            instance, points = self._instance(problem, model)
+            model = build_model(self.structure(problem, timed=time_limit is not None))
+            instance, points = lay_out(problem, model)
             built, before = time.perf_counter(), model.build_time
             result = self._rounds(instance, points, warm_start, deadline, time_limit)
         except (BackendError, ImportError) as error:
@@ -103,7 +102,15 @@ class CasadiBackend:
         spent = time.perf_counter() - built
         return replace(result, build_time=built - begin + late, solve_time=spent - late)
 
-    def _structure(self, problem: RepairProblem, timed: bool) -> Structure:
+    def structure(self, problem: RepairProblem, *, timed: bool = False) -> Structure:
+        """The structure of a problem: what its model depends on.
+
+        Parameters
+        ----------
+        problem : RepairProblem
+        timed : bool
+            The solver can be stopped in time.
+        """
         c = self.config
         return Structure(
             n=n_points_for(problem.t_end - problem.t_rep, self.spacing, self.degree),
@@ -117,28 +124,9 @@ class CasadiBackend:
             max_iterations=c.max_iterations,
             tolerance=c.tolerance,
             tangent=float(np.tan(c.heading)),
-            overhang=c.overhang,
+            overhang=_overhang(problem) if c.overhang is None else c.overhang,
             timed=timed,
         )
-
-    # -- layout ----------------------------------------------------------------------------------
-
-    def _instance(self, problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
-        """Lay out the problem, and the initial control points (n, 2)."""
-        n, p, h = model.structure.n, self.degree, self.spacing
-        origin = np.array([problem.start[0, 0], 0.0])
-        derivatives = np.zeros((p, 2))
-        derivatives[:3] = problem.start
-        if p > 3:
-            derivatives[3] = problem.reference.sample([problem.t_rep]).jerk[0]
-        head = splice_points(derivatives, p, h) - origin
-        points = fit_to_curve(guide_of(problem), problem.t_rep, n, p, h).points - origin
-        points[:p] = head
-        if not problem.lateral and problem.passing is not None:
-            points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
-        return Instance(problem, model, origin, head), points
-
-    # -- rounds ----------------------------------------------------------------------------------
 
     def _rounds(
         self,
@@ -150,13 +138,13 @@ class CasadiBackend:
     ) -> SolveResult:
         """Solve around the guide, then around the solution, until the exact constraints are kept."""
         problem, model = instance.problem, instance.model
-        why = instance.start_violation()
+        why = start_violation(problem)
         if why:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
-        separation, points, why, closest = self._open(instance, points)
+        separation, points, why, closest = open_sides(instance, points)
         if why:
             return self._infeasible(instance, why, closest)
-        residuals = instance.residuals(separation, points)
+        residuals = residuals_of(instance, separation, points)
         if _answered(instance, points, residuals):
             word = "the optimum of the linear rows keeps the others too"
             found, cost = self._curve(instance, points), instance.objective(points)
@@ -168,7 +156,7 @@ class CasadiBackend:
             low, high = instance.bounds(separation, points, trust)
             points, status, word, count = self._run(instance, points, low, high, deadline)
             iterations += count
-            residuals = instance.residuals(separation, points)
+            residuals = residuals_of(instance, separation, points)
             kept = largest_violation(residuals) <= TOLERANCE
             if status is not SolveStatus.SOLVED or kept:
                 break
@@ -205,56 +193,9 @@ class CasadiBackend:
             return SolveResult(SolveStatus.INFEASIBLE, detail=why)
         curve = self._curve(instance, closest[0])
         return SolveResult(
-            SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve}
-        )
-
-    def _open(
-        self, instance: Instance, points: Array
-    ) -> tuple[Separation, Array, str, tuple[Array, dict[str, float]] | None]:
-        """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
-
-        The last item is the curve that misses the obstacles by the least, and what it violates.
-
-        The guide's sides come first. Where they contradict the limits, the curve that misses the
-        obstacles by the least is asked for its sides instead, and so on.
-        """
-        model, problem, windows = instance.model, instance.problem, instance.windows
-        slope = instance.slope
-        moment = windows.moment
-        shape = guide_of(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
-        if not problem.lateral:
-            shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
-        room = instance.room(shape)
-        why, before = "", None
-        closest: tuple[Array, dict[str, float]] | None = None
-        for _ in range(_SIDES):
-            separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
-            if separation.why:
-                return separation, points, separation.why, closest
-            side = separation.side
-            if before is not None and side is not None and np.array_equal(side, before):
-                break
-            before = side
-            gap = gap_of(separation)
-            why = why or gap
-            low, high = instance.bounds(separation, None)
-            x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
-            if x is not None:
-                points = instance.relaxed = model.with_unknowns(points, x)
-            if possible:
-                return separation, points, "", closest
-            modest = instance.bounds(separation, None, modest=True)
-            elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
-            if elastic is None:
-                why = why or "no curve from the start state keeps the limits and the road"
-                return separation, points, why, closest
-            points = model.with_unknowns(points, elastic[0])
-            if closest is None or elastic[1] < closest[1]["obstacles"]:
-                closest = points, instance.residuals(separation, points) | {"obstacles": float(elastic[1])}
-            why = why or missed(instance, separation, points, elastic[1])
-            shape = instance.shape(points)
-            room = instance.room(shape)
-        return separation, points, why, closest
+            SolveStatus.INFEASIBLE, detail=why, residuals=closest[1], stages={"closest": curve},
+            closest=Closest(curve, closest[1]["obstacles"]),
+        )  # fmt: skip
 
     def _warmer(
         self,
@@ -265,7 +206,7 @@ class CasadiBackend:
         warm_start: Curve | None,
     ) -> Array:
         """The neighbouring probe's curve instead of ``points`` where it violates less."""
-        if warm_start is None or warm_start.t_start > instance.problem.t_rep + 1e-9:
+        if warm_start is None or warm_start.t_start > instance.problem.t_rep + INSTANT:
             return points
         worst = largest_violation(residuals)
         if worst <= 0.0:
@@ -275,7 +216,7 @@ class CasadiBackend:
             fit_to_curve(warm_start, t_rep, len(points), self.degree, self.spacing).points - instance.origin
         )
         warm = model.with_unknowns(points, model.unknowns(shifted))
-        return warm if max(instance.residuals(separation, warm).values()) < worst else points
+        return warm if max(residuals_of(instance, separation, warm).values()) < worst else points
 
     def _run(
         self, instance: Instance, points: Array, low: Array, high: Array, deadline: float | None
@@ -305,13 +246,18 @@ def _answered(instance: Instance, points: Array, residuals: dict[str, float]) ->
     )
 
 
+def _overhang(problem: RepairProblem) -> float:
+    """Half the length of the body [m], to the next centimetre: a little more than it is, never less."""
+    return float(np.ceil(100.0 * problem.half_length - 1e-9) / 100.0)
+
+
 def _require(problem: RepairProblem) -> None:
-    if not problem.t_end - problem.t_rep > 1e-9:
+    if not problem.t_end - problem.t_rep > INSTANT:
         raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
     if not np.isfinite(problem.start).all():
         raise BackendError(f"the state at t_rep = {problem.t_rep:g} s is not finite")
 
 
-def make(config: Config) -> CasadiBackend:
+def make(config: Configuration) -> CasadiBackend:
     """The backend as the configuration describes it."""
-    return CasadiBackend(config.casadi, degree=config.repair.degree, spacing=config.repair.spacing)
+    return CasadiBackend(config.section("casadi"), degree=config.repair.degree, spacing=config.repair.spacing)

@@ -1,4 +1,4 @@
-"""CasADi functions that read and write NumPy arrays, and a watch that stops a solver in time."""
+"""CasADi functions that read and write NumPy arrays, a watch that stops a solver in time, and its errors."""
 
 from __future__ import annotations
 
@@ -67,7 +67,15 @@ class Buffered:
 
 
 class Deadline:
-    """Holds CasADi's callback and the time at which it stops the solver."""
+    """Holds CasADi's callback and the time at which it stops the solver.
+
+    Attributes
+    ----------
+    at : float
+        Of :func:`time.perf_counter` [s]; infinite to begin with.
+    callback : casadi.Callback
+        CasADi does not keep it alive.
+    """
 
     def __init__(self) -> None:
         self.at = float("inf")
@@ -75,6 +83,13 @@ class Deadline:
 
 
 def deadline_callback(nlp: dict[str, Any]) -> Deadline:
+    """A watch over the solver of an NLP, to be given to it as ``iteration_callback``.
+
+    Parameters
+    ----------
+    nlp : dict
+        What CasADi's ``nlpsol`` takes.
+    """
     import casadi as ca
 
     holder = Deadline()
@@ -109,6 +124,13 @@ def deadline_callback(nlp: dict[str, Any]) -> Deadline:
 
 
 def quadratic_program(name: str, hessian: Any, matrix: Any) -> Buffered:
+    """A QP that daqp solves, of constant Hessian and rows (``casadi.DM``).
+
+    Raises
+    ------
+    RuntimeError
+        Of CasADi, where it cannot make the solver.
+    """
     import casadi as ca
 
     shapes = {"h": hessian.sparsity(), "a": matrix.sparsity()}
@@ -117,15 +139,18 @@ def quadratic_program(name: str, hessian: Any, matrix: Any) -> Buffered:
 
 
 def sparse(matrix: Array) -> Any:
+    """A matrix as ``casadi.DM``, without the entries that are zero but for rounding."""
     import casadi as ca
 
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-14, 0.0, matrix)))
 
 
 def unavailable(error: Exception) -> BackendError:
+    """What to raise where CasADi cannot make a solver."""
     return BackendError(f"CasADi cannot make the solver: {last_line(error)}")
 
 
 def last_line(error: Exception) -> str:
+    """The last line of what CasADi throws: its reason; the lines before say where in its source."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__

@@ -1,33 +1,52 @@
-"""One repair problem laid out for its NLP: bounds, data, objective, and what a solution violates."""
+"""One repair problem laid out for its NLP: windows, bounds, data of the samples, objective."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from repair.arrays import Array
+from repair.arrays import Array, frozen
+from repair.curves.base import Curve
+from repair.curves.bspline import greville_offsets
+from repair.curves.fitting import fit_to_curve, splice_points
+from repair.curves.sampled import SampledCurve
+from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
-from repair.solvers.casadi.model import SAMPLED, STANDSTILL, Model
-from repair.solvers.casadi.rows import FAMILIES
-from repair.solvers.casadi.separation import Boxes, Separation, Windows, boxes_in, road_room
+from repair.solvers.casadi.model import Model
+from repair.solvers.casadi.rows import SAMPLED, Datum, RowKind
+from repair.solvers.casadi.separation import Separation, road_room
+from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
+from repair.timegrid import INSTANT
 
-__all__ = ["ROAD_SLACK", "TOLERANCE", "Instance", "plane_acceleration"]
+__all__ = [
+    "ROAD_SLACK",
+    "Instance",
+    "axis_curvature",
+    "guide_of",
+    "in_plane",
+    "lay_out",
+    "limit_values",
+    "plane_acceleration",
+]
 
-TOLERANCE = 1e-6  # largest violation of a curve that is called solved
-ROAD_SLACK = 0.5  # [m] of s either way of the last path over which the road must be wide enough
+ROAD_SLACK = 0.5  #: [m] of s either way of the last path over which the road must be wide enough
 _TIGHTEN = 1e-7  # bounds are taken in by this much, so that the solver's own tolerance stays inside
 _CROSSED = 5e-7  # of bounds that touch each other or nearly so
 _FRICTION = 0.995  # share of the friction circle used at the samples, for what happens in between
 _EDGE = 0.05  # [m] kept from the edge of the road
 _OWN = 0.05  # [m] by which the body's ends may always leave the axis' own
 _INF = np.inf
-_MODEST = np.where(np.isin(np.arange(12), (2, 3)), _FRICTION, 1.0)  # for the rows of the accelerations
-
-
+# Factors of the bounds by kind of row: those of the accelerations are taken in.
+_MODEST = np.ones(len(RowKind))
+_MODEST[[RowKind.ACCELERATION_S, RowKind.ACCELERATION_L]] = _FRICTION
 _STEP = 0.25  # [m] of s either way for the slope of the axis' curvature
 _AROUND = np.array([[0.0], [_STEP], [-_STEP]])
+
+
+def guide_of(problem: RepairProblem) -> Curve:
+    """The curve that shows the way: the guide, or the reference where there is none."""
+    return problem.reference if problem.passing is None else SampledCurve(problem.passing.guide)
 
 
 def axis_curvature(problem: RepairProblem, s: Array) -> tuple[Array, Array]:
@@ -36,21 +55,38 @@ def axis_curvature(problem: RepairProblem, s: Array) -> tuple[Array, Array]:
     return kappa, (ahead - behind) / (2.0 * _STEP)
 
 
-def _excess(*values: Any) -> float:
-    """The largest of 0 and these numbers; NaN if one of them is (the built-in ``max`` may lose it)."""
-    return float(np.maximum.reduce((0.0, *values)))
-
-
 def plane_acceleration(problem: RepairProblem, states: Array) -> tuple[Array, Array]:
     """Acceleration along and across the axis (K,) of states (K, 3, 2)."""
-    return _in_plane(*axis_curvature(problem, states[:, 0, 0]), states.swapaxes(0, 1))
+    return in_plane(*axis_curvature(problem, states[:, 0, 0]), states.swapaxes(0, 1))
 
 
-def _in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
-    """The same for states (3, K, 2), where the axis' curvature is known."""
+def in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
+    """Acceleration along and across the axis (K,) of states (3, K, 2) where its curvature is known."""
     l, (v, w), (a, b) = states[0, :, 1], states[1].T, states[2].T  # noqa: E741
     scale, square = 1.0 - kappa * l, v**2
     return scale * a - 2.0 * kappa * v * w - slope * l * square, b + scale * kappa * square
+
+
+@lru_cache(maxsize=128)
+def limit_values(limits: Limits) -> tuple[Array, Array]:
+    """Smallest and largest value (12,) of every :class:`repair.solvers.casadi.rows.RowKind`."""
+    side = limits.a_lat if limits.a_lat < limits.a_total - 1e-9 else _INF
+    values = {
+        RowKind.VELOCITY_S: (0.0, limits.v_max),
+        RowKind.VELOCITY_L: (-limits.v_lat, limits.v_lat),
+        RowKind.ACCELERATION_S: (limits.a_min, limits.a_max),
+        RowKind.ACCELERATION_L: (-limits.a_lat, limits.a_lat),
+        RowKind.JERK_S: (-limits.j_lon, limits.j_lon),
+        RowKind.JERK_L: (-limits.j_lat, limits.j_lat),
+        RowKind.PLACE: (-_INF, _INF),
+        RowKind.HEADING: (0.0, _INF),
+        RowKind.CIRCLE: (-_INF, (_FRICTION * limits.a_total) ** 2),
+        RowKind.ACROSS: (-side, side),
+        RowKind.ALONG: (limits.a_min, limits.a_max),
+        RowKind.CURVATURE: (-limits.curvature, limits.curvature),
+    }
+    low, high = zip(*(values[kind] for kind in RowKind), strict=True)
+    return frozen(low), frozen(high)
 
 
 class Instance:
@@ -69,6 +105,7 @@ class Instance:
     def __init__(self, problem: RepairProblem, model: Model, origin: Array, head: Array) -> None:
         self.problem, self.model, self.origin, self.head = problem, model, origin, head
         self.windows = self._windows()
+        self.limits = limit_values(problem.limits)  # by kind of row
         self.relaxed: Array | None = None  # the optimum of the linear rows, once it is known
         # The given points' share of the linear rows, and of the samples' states.
         self.given = model.given @ head.T.ravel()
@@ -107,29 +144,23 @@ class Instance:
         problem, structure = self.problem, self.model.structure
         p, h = structure.degree, structure.spacing
         if structure.sampled:
-            times = problem.t_rep + (np.arange(p, structure.n) - (p - 1) / 2) * h
-            keep = np.flatnonzero(times <= problem.t_end + 1e-9)
+            times = problem.t_rep + greville_offsets(structure.n, p, h)[p:]
+            keep = np.flatnonzero(times <= problem.t_end + INSTANT)
             return Windows(times[keep], times[keep], keep[:, None], np.zeros(1))
         edges = problem.t_rep + self.model.edge
-        count = int(edges[:-1].searchsorted(problem.t_end - 1e-9))
+        count = int(edges[:-1].searchsorted(problem.t_end - INSTANT))
         return Windows(
             edges[:count], edges[1 : count + 1], self.model.window_row[:count], self.model.fraction
         )
 
     @cached_property
-    def _limit_values(self) -> tuple[Array, Array]:
-        """Smallest and largest value of every kind of row, in the order of ``Layout.kind``."""
-        c = self.problem.limits
-        side = c.a_lat if c.a_lat < c.a_total - 1e-9 else _INF
-        low = [0.0, -c.v_lat, c.a_min, -c.a_lat, -c.j_lon, -c.j_lat]
-        high = [c.v_max, c.v_lat, c.a_max, c.a_lat, c.j_lon, c.j_lat]
-        low += [-_INF, 0.0, -_INF, -side, c.a_min, -c.curvature]
-        high += [_INF, _INF, (_FRICTION * c.a_total) ** 2, side, c.a_max, c.curvature]
-        return np.array(low), np.array(high)
+    def row_limits(self) -> tuple[Array, ...]:
+        """Bounds (R, 2) of velocity, acceleration and jerk at all of their Bernstein points."""
+        return tuple(side[: RowKind.PLACE].reshape(3, 2)[self.model.order] for side in self.limits)
 
     def _limit_bounds(self, modest: bool = False) -> tuple[Array, Array]:
         """Bounds of all rows; those of the position rows and the body's ends are filled in later."""
-        model, (least, most) = self.model, self._limit_values
+        model, (least, most) = self.model, self.limits
         if modest:
             least, most = least * _MODEST, most * _MODEST
         low, high = least[model.kind], most[model.kind]
@@ -146,9 +177,16 @@ class Instance:
     ) -> tuple[Array, Array]:
         """Bounds of all rows of the model, taken in by the solver's own tolerance.
 
-        ``around`` are control points nearby, for the body's ends (left open without it); with ``trust``
-        [m] s stays that close to their curve. ``modest`` keeps the accelerations inside the share of the
-        friction circle that the nonlinear rows use, for a solution that is sought without those rows.
+        Parameters
+        ----------
+        separation : Separation
+        around : (n, 2) array or None
+            Control points nearby, for the body's ends; those are left open without it.
+        trust : float, optional
+            How close s stays to their curve [m].
+        modest : bool
+            Keep the accelerations inside the share of the friction circle that the nonlinear rows use:
+            for a solution that is sought without those rows.
         """
         model = self.model
         base = self._modest if modest else (self.lower, self.upper)
@@ -164,7 +202,7 @@ class Instance:
         if self.problem.lateral and around is not None:
             s = model.samples[0] @ around[:, 0] + self.origin[0]
             ends = slice(len(low) - 2 * len(s), None)
-            low[ends], high[ends] = self._room_of_ends(s, min(ROAD_SLACK, trust or _INF), _EDGE)
+            low[ends], high[ends] = self.room_of_ends(s, min(ROAD_SLACK, trust or _INF), _EDGE)
         low += _TIGHTEN
         high -= _TIGHTEN
         # Where there is exactly room for one value, that is left no room by what was just taken.
@@ -176,11 +214,12 @@ class Instance:
         """What the nonlinear rows need to know: the given points' share, and the axis' curvature."""
         model, problem = self.model, self.problem
         data = np.empty((SAMPLED, len(model.tau)))
-        data[:3] = self.state_given[..., 0]
-        data[3:6] = self.state_given[..., 1] if problem.lateral else [b @ points[:, 1] for b in model.samples]
+        data[Datum.S : Datum.L] = self.state_given[..., 0]
+        sideways = self.state_given[..., 1] if problem.lateral else [b @ points[:, 1] for b in model.samples]
+        data[Datum.L : Datum.BEND] = sideways
         s = model.samples[0] @ points[:, 0]
         kappa, slope = axis_curvature(problem, s + self.origin[0])
-        data[6], data[7] = kappa - slope * s, slope
+        data[Datum.BEND], data[Datum.BEND_SLOPE] = kappa - slope * s, slope
         return data
 
     def objective(self, points: Array) -> float:
@@ -190,9 +229,9 @@ class Instance:
 
     def keeps_circle(self, points: Array) -> bool:
         """Whether the rows that are nonlinear with s alone are kept, as tightly as the solver is asked to."""
-        first, count = self.model.linear_count, len(self.model.tau)
+        most = self.limits[1]
         along, across = plane_acceleration(self.problem, self._states(points).swapaxes(0, 1))
-        total, side = self.upper[first] - _TIGHTEN, self.upper[first + count] - _TIGHTEN
+        total, side = most[RowKind.CIRCLE] - _TIGHTEN, most[RowKind.ACROSS] - _TIGHTEN
         return bool((along**2 + across**2).max() <= total and np.abs(across).max() <= side)
 
     def _states(self, points: Array) -> Array:
@@ -200,25 +239,6 @@ class Instance:
         states = (self.model.evaluated[self.model.family_start[-1] :] @ points).reshape(3, -1, 2)
         states[0] += self.origin
         return np.asarray(states)
-
-    def start_violation(self) -> str:
-        """The first limit that the given state itself breaks, as a sentence."""
-        problem, limits = self.problem, self.problem.limits
-        v, a = (float(x) for x in problem.start[1:, 0])
-        along, across = plane_acceleration(problem, problem.start[None])
-        total = float(np.hypot(along, across)[0])
-        if v < -TOLERANCE:
-            return f"the start speed {v:.2f} m/s is below 0"
-        if v > limits.v_max + TOLERANCE:
-            return f"the start speed {v:.2f} m/s is above v_max {limits.v_max:.2f} m/s"
-        if a < limits.a_min - TOLERANCE:
-            return f"the start acceleration {a:.2f} m/s² is below a_min {limits.a_min:.2f} m/s²"
-        if a > limits.a_max + TOLERANCE:
-            return f"the start acceleration {a:.2f} m/s² is above a_max {limits.a_max:.2f} m/s²"
-        if total > limits.a_total + TOLERANCE:
-            circle = f"the friction circle of {limits.a_total:.2f} m/s²"
-            return f"the start acceleration {total:.2f} m/s² is outside {circle}"
-        return ""
 
     def room(self, shape: Array, slack: float = ROAD_SLACK) -> tuple[Array, Array] | None:
         """Room on the road over the s that a curve's window points (W, C, 2) cover, and ``slack`` around."""
@@ -228,10 +248,19 @@ class Instance:
         s, own = shape[..., 0], problem.start[0, 1]
         return road_room(problem.bounds, s.min(axis=1) - slack, s.max(axis=1) + slack, own, own, _EDGE)
 
-    def _room_of_ends(self, s: Array, slack: float, edge: float) -> tuple[Array, Array]:
-        """Right and left end of the road (2 S,) at the body's front, then at its back, for samples at s.
+    def room_of_ends(self, s: Array, slack: float, edge: float) -> tuple[Array, Array]:
+        """Right and left end of the road (2 S,) at the body's front, then at its back.
 
         The road is wide enough for the ends of a body that follows the axis, whatever the bounds say.
+
+        Parameters
+        ----------
+        s : (S,) array
+            At the samples [m].
+        slack : float
+            By how much s may differ from that either way [m].
+        edge : float
+            Distance kept from either edge [m].
         """
         problem, model = self.problem, self.model
         reach, start = model.structure.overhang, float(problem.start[0, 1])
@@ -241,69 +270,25 @@ class Instance:
         ends = np.concatenate((s + reach, s - reach))
         own = np.concatenate((right, right)), np.concatenate((left, left))
         right, left = road_room(problem.bounds, ends - slack, ends + slack, *own, edge)
-        over = problem.t_rep + model.tau > problem.t_end + 1e-9
+        over = problem.t_rep + model.tau > problem.t_end + INSTANT
         if over.any():
             right.reshape(2, -1)[:, over] = -_INF
             left.reshape(2, -1)[:, over] = _INF
         return right, left
 
-    @cached_property
-    def _row_limits(self) -> tuple[Array, ...]:
-        """Bounds (R, 2) of velocity, acceleration and jerk at all of their Bernstein points."""
-        return tuple(side[:6].reshape(3, 2)[self.model.order] for side in self._limit_values)
 
-    def residuals(self, separation: Separation, points: Array) -> dict[str, float]:
-        """Largest violation of every family, from the control points and the problem alone."""
-        model, problem, first = self.model, self.problem, self.model.family_start
-        value = model.evaluated @ points
-        placed = value[first[3] : first[4]] + self.origin
-        states = value[first[4] :].reshape(3, -1, 2)
-        states[0] += self.origin
-        (low, high), moving = self._row_limits, value[: first[3]]
-        derivatives = np.maximum.reduceat(np.maximum(low - moving, moving - high), first[:3])
-        depth = np.maximum(separation.lower - placed, placed - separation.upper).max(axis=0)
-        axes = model.structure.axes
-        worst = [*derivatives[:, :axes].max(axis=1).tolist(), float(depth[:axes].max())]
-        # What is not a number stays one: max() keeps its first argument then.
-        found = {family: max(x, 0.0) for family, x in zip(FAMILIES, worst, strict=True)}
-        if problem.lateral:
-            v = value[: first[1]]
-            found["heading"] = max(float((np.abs(v[:, 1]) - model.structure.tangent * v[:, 0]).max()), 0.0)
-            found["road"] = self._road_violation(placed)
-        return found | self._plane_violations(states)
-
-    def _plane_violations(self, states: Array) -> dict[str, float]:
-        """Accelerations and curvature at the ends of the windows, with the axis' true curvature."""
-        problem, limits = self.problem, self.problem.limits
-        kappa, slope = axis_curvature(problem, states[0, :, 0])
-        along, across = _in_plane(kappa, slope, states)
-        found = {
-            "friction": _excess(np.hypot(along, across).max() - limits.a_total),
-            "lateral_acceleration": _excess(np.abs(across).max() - limits.a_lat),
-        }
-        if problem.lateral:
-            found["longitudinal_acceleration"] = max(
-                0.0, float(along.max()) - limits.a_max, limits.a_min - float(along.min())
-            )
-            (s, l), (v, w) = states[0].T, states[1].T  # noqa: E741
-            forward = (1.0 - kappa * l) * v
-            square = forward**2 + w**2 + STANDSTILL
-            speed = np.sqrt(square)
-            bend = (forward * across - w * along) / (square * speed)
-            found["curvature"] = _excess(np.abs(bend).max() - limits.curvature)
-            reach = self.model.structure.overhang
-            middle, swing = l - 0.5 * reach**2 * kappa, reach * w / speed
-            ends = np.concatenate((middle + swing, middle - swing))
-            right, left = self._room_of_ends(s, 0.0, 0.0)
-            found["body_on_road"] = _excess((right - ends).max(), (ends - left).max())
-        return found
-
-    def _road_violation(self, placed: Array) -> float:
-        """How far the points of l leave the road anywhere over the s that their window covers."""
-        problem, row = self.problem, self.windows.row
-        if not len(row):
-            return 0.0
-        s, l = placed[:, 0][row], placed[:, 1][row]  # noqa: E741
-        own = problem.start[0, 1]
-        right, left = road_room(problem.bounds, s.min(axis=1), s.max(axis=1), own, own, 0.0)
-        return _excess((right - l.min(axis=1)).max(), (l.max(axis=1) - left).max())
+def lay_out(problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
+    """The instance of a problem, and its initial control points (n, 2) less the origin: the guide's."""
+    structure = model.structure
+    n, p, h = structure.n, structure.degree, structure.spacing
+    origin = np.array([problem.start[0, 0], 0.0])
+    derivatives = np.zeros((p, 2))
+    derivatives[:3] = problem.start
+    if p > 3:
+        derivatives[3] = problem.reference.sample([problem.t_rep]).jerk[0]
+    head = splice_points(derivatives, p, h) - origin
+    points = fit_to_curve(guide_of(problem), problem.t_rep, n, p, h).points - origin
+    points[:p] = head
+    if not problem.lateral and problem.passing is not None:
+        points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
+    return Instance(problem, model, origin, head), points

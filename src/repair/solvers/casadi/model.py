@@ -2,9 +2,8 @@
 
 Everything that is linear in the control points (derivative limits, obstacles, room, direction of
 travel) is a constant matrix with bounds that change from problem to problem
-(:mod:`repair.solvers.casadi.rows`); only the accelerations and the curvature of the driven path, and
-where the ends of the body are, are nonlinear. A :class:`Model` therefore depends on sizes and settings
-alone and is kept for the life of the process.
+(:mod:`repair.solvers.casadi.rows`); what is not is :mod:`repair.solvers.casadi.nlp`. A :class:`Model`
+therefore depends on sizes and settings alone and is kept for the life of the process.
 """
 
 from __future__ import annotations
@@ -13,30 +12,36 @@ import threading
 import time
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
 from repair.arrays import Array
+from repair.backend.base import SolveStatus
 from repair.solvers.casadi.buffered import (
     Buffered,
     Deadline,
-    deadline_callback,
     last_line,
     quadratic_program,
     sparse,
     unavailable,
 )
-from repair.solvers.casadi.rows import Layout, Structure
+from repair.solvers.casadi.nlp import make_nlp
+from repair.solvers.casadi.rows import Layout, RowKind, Structure
 
-__all__ = ["SAMPLED", "STANDSTILL", "Model", "Solution", "build_model"]
+__all__ = ["TOLERANCE", "Model", "Solution", "build_model", "status_of"]
 
-#: Parameters of every sample of the nonlinear rows: the part of s, s', s'', l, l', l'' that does not
-#: depend on the unknowns, and the axis' curvature as a line in s (value, slope).
-SAMPLED = 8
-# Added to the squared speed [m²/s²] where the path's curvature divides by it.
-STANDSTILL = 0.01
+TOLERANCE = 1e-6  #: largest violation of a curve that is called solved
 _DAQP_INFEASIBLE = -1
+_STATUS = {
+    "Solve_Succeeded": SolveStatus.SOLVED,
+    "Solved_To_Acceptable_Level": SolveStatus.SOLVED,
+    "Feasible_Point_Found": SolveStatus.SOLVED,
+    "Infeasible_Problem_Detected": SolveStatus.INFEASIBLE,
+    "Maximum_Iterations_Exceeded": SolveStatus.ITERATION_LIMIT,
+    "Maximum_CpuTime_Exceeded": SolveStatus.TIME_LIMIT,
+    "Maximum_WallTime_Exceeded": SolveStatus.TIME_LIMIT,
+    "User_Requested_Stop": SolveStatus.TIME_LIMIT,
+}
 
 
 @dataclass(frozen=True)
@@ -87,49 +92,34 @@ class Model(Layout):
         self.build_time = time.perf_counter() - begin
 
     @cached_property
-    def _function(self) -> Buffered:
+    def nlp(self) -> Buffered:
+        """The function that solves the NLP, made when it is first asked for.
+
+        Raises
+        ------
+        BackendError
+            If CasADi cannot make it.
+        """
         begin = time.perf_counter()
         try:
-            return Buffered(self._compile())
+            function, self._deadline = make_nlp(self, self._hessian, self._matrix)
+            return Buffered(function)
         except RuntimeError as error:
             raise unavailable(error) from error
         finally:
             self.build_time += time.perf_counter() - begin
 
-    def _compile(self) -> Any:
-        import casadi as ca
-
-        s, p = self.structure, self.structure.degree
-        m = s.n - p
-        x = ca.SX.sym("x", m * s.axes)
-        count = len(self.tau)
-        data = ca.SX.sym("data", count, SAMPLED)
-        slope = ca.SX.sym("slope", m * s.axes)
-        hessian, matrix = self._hessian, self._matrix
-        objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
-        axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
-        along, across, rest = self._nonlinear(axes, data)
-        g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
-        nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
-        curvature = None
-        if s.solver != "ipopt":
-            # The objective's own Hessian and the friction circles' J'J, positive definite always.
-            factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
-            circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
-            bent = factor * hessian
-            for part in (along, across):
-                slope_of = ca.jacobian(part, x)
-                bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
-            names = ["x", "p", "lam_f", "lam_g"]
-            curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
-        return self._make_solver(nlp, curvature)
+    @property
+    def compiled(self) -> bool:
+        """Whether the NLP has been made."""
+        return "nlp" in vars(self)
 
     def _compile_elastic(self) -> None:
         """The QP in which all obstacle rows give way by the same, smallest possible amount."""
         import casadi as ca
 
         matrix = self.free
-        owner = np.repeat([rows.family == "obstacles" for rows in self.linear], [len(k) for k in self.kept])
+        owner = np.repeat([rows.kind == RowKind.PLACE for rows in self.linear], [len(k) for k in self.kept])
         self._soft = np.flatnonzero(owner)
         count, m = matrix.shape
         a = np.zeros((count + len(self._soft), m + 1))
@@ -146,6 +136,13 @@ class Model(Layout):
 
     def elastic(self, slope: Array, low: Array, high: Array) -> tuple[Array, float] | None:
         """Unknowns that keep all linear rows but the obstacles', and those as nearly as possible.
+
+        Parameters
+        ----------
+        slope : (m,) array
+            Linear part of the objective.
+        low, high : (R,) array
+            Bounds of all rows; those of the nonlinear ones are left aside.
 
         Returns
         -------
@@ -168,60 +165,17 @@ class Model(Layout):
                 return None
             return out["x"][:-1].copy(), float(out["x"][-1])
 
-    def _nonlinear(self, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
-        """Accelerations, curvature of the driven path, ends of the body at the samples.
-
-        With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the
-        acceleration (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2). The ends of a straight
-        body of half length d lie at l - kappa d^2 / 2 +- d sin(heading).
-        """
-        import casadi as ca
-
-        p = self.structure.degree
-        free = [sparse(b[:, p:]) for b in self.samples]
-        s, v, a = (ca.mtimes(free[k], axes[0]) + data[:, k] for k in range(3))
-        if self.structure.lateral:
-            l, w, b = (ca.mtimes(free[k], axes[1]) + data[:, 3 + k] for k in range(3))  # noqa: E741
-        else:
-            l, w, b = data[:, 3], data[:, 4], data[:, 5]  # noqa: E741
-        slope = data[:, 7]
-        kappa = data[:, 6] + slope * s
-        scale = 1.0 - kappa * l
-        along = scale * a - 2.0 * kappa * v * w - slope * l * v**2
-        across = b + scale * kappa * v**2
-        rest = []
-        if self.structure.lateral:
-            forward = scale * v
-            square = forward**2 + w**2 + STANDSTILL
-            middle = l - 0.5 * self.structure.overhang**2 * kappa
-            swing = self.structure.overhang * w / square**0.5
-            rest = [along, (forward * across - w * along) / square**1.5, middle + swing, middle - swing]
-        return along, across, rest
-
-    def _make_solver(self, nlp: dict[str, Any], curvature: Any) -> Any:
-        import casadi as ca
-
-        s = self.structure
-        options: dict[str, Any] = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
-        if s.timed:
-            self._deadline = deadline_callback(nlp)
-            options["iteration_callback"] = self._deadline.callback
-        if s.solver == "ipopt":
-            options["ipopt"] = {
-                "print_level": 0, "sb": "yes", "max_iter": s.max_iterations, "tol": s.tolerance,
-                "constr_viol_tol": 1e-8, "bound_relax_factor": 0.0, "mu_strategy": "adaptive",
-            }  # fmt: skip
-        else:
-            options |= {
-                "print_header": False, "print_iteration": False, "print_status": False,
-                "max_iter": s.max_iterations, "tol_pr": 1e-8, "tol_du": max(s.tolerance, 1e-6),
-                "qpsol": "daqp", "qpsol_options": {"error_on_fail": False},
-                "hessian_approximation": "exact", "hess_lag": curvature,
-            }  # fmt: skip
-        return ca.nlpsol("repair", s.solver, nlp, options)
-
     def presolve(self, x0: Array, slope: Array, low: Array, high: Array) -> tuple[Array | None, bool]:
         """The convex QP of the objective and the linear rows alone.
+
+        Parameters
+        ----------
+        x0 : (m,) array
+            Initial guess of the unknowns.
+        slope : (m,) array
+            Linear part of the objective.
+        low, high : (R,) array
+            Bounds of all rows; those of the nonlinear ones are left aside.
 
         Returns
         -------
@@ -250,7 +204,7 @@ class Model(Layout):
         x0 : (m,) array
             Initial guess of the unknowns.
         data : (8, S) array
-            See :data:`SAMPLED`.
+            See :class:`repair.solvers.casadi.rows.Datum`.
         slope : (m,) array
             Linear part of the objective.
         low, high : (R,) array
@@ -264,7 +218,7 @@ class Model(Layout):
             If CasADi cannot make the solver.
         """
         with self._lock:
-            function = self._function
+            function = self.nlp
             if self._deadline is not None:
                 self._deadline.at = deadline if deadline is not None else float("inf")
             try:
@@ -284,3 +238,15 @@ class Model(Layout):
 def build_model(structure: Structure) -> Model:
     """The model of a structure; made at the first call, kept after that."""
     return Model(structure)
+
+
+def status_of(model: Model, solution: Solution) -> SolveStatus:
+    """What a solver's word means. An SQP's word alone proves nothing: what it left has to keep the rows."""
+    if model.structure.solver == "ipopt":
+        return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)
+    if not solution.violation <= TOLERANCE:
+        timed_out = solution.word == "User_Requested_Stop"
+        return SolveStatus.TIME_LIMIT if timed_out else SolveStatus.NUMERICAL_ERROR
+    if solution.word == "Search_Direction_Becomes_Too_Small":
+        return SolveStatus.SOLVED  # the QP's step is nil: a stationary point
+    return _STATUS.get(solution.word, SolveStatus.NUMERICAL_ERROR)

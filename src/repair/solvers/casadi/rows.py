@@ -9,6 +9,7 @@ B-spline's control points and are the tighter hull.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import lru_cache
 from math import comb
 
@@ -16,17 +17,61 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, frozen
-from repair.curves.bases import basis_matrix, derivative_matrix, segment_matrix
+from repair.curves.bases import basis_matrix, derivative_matrix, segment_matrix, to_bernstein
+from repair.curves.bspline import greville_offsets
 
-__all__ = ["FAMILIES", "Layout", "Rows", "Structure", "bernstein_rows"]
+__all__ = ["FAMILIES", "SAMPLED", "Datum", "Layout", "RowKind", "Rows", "Structure", "bernstein_rows"]
 
-
+#: The linear rows of an axis, in their order.
 FAMILIES = ("velocity", "acceleration", "jerk", "obstacles")
+
+
+class RowKind(IntEnum):
+    """What bounds a row. Those before ``PLACE`` are the derivatives, in turn of s and of l."""
+
+    VELOCITY_S = 0
+    VELOCITY_L = 1
+    ACCELERATION_S = 2
+    ACCELERATION_L = 3
+    JERK_S = 4
+    JERK_L = 5
+    PLACE = 6  #: where obstacles and road are: nothing that is known beforehand
+    HEADING = 7  #: the direction of travel
+    CIRCLE = 8  #: the friction circle
+    ACROSS = 9  #: the acceleration across the axis
+    ALONG = 10  #: the acceleration along the axis
+    CURVATURE = 11  #: that of the driven path
+
+
+class Datum(IntEnum):
+    """What the nonlinear rows need to know about each sample, by row of the data (8, S).
+
+    Of position, velocity and acceleration it is the part that does not depend on the unknowns; the axis'
+    curvature is a line in s.
+    """
+
+    S = 0  #: s, and its derivatives in the next two rows
+    L = 3  #: l, and its derivatives in the next two rows
+    BEND = 6  #: the line's value at s = 0
+    BEND_SLOPE = 7  #: and its slope
+
+
+SAMPLED = 8  #: rows of that data
+
+_KINDS = (
+    (RowKind.VELOCITY_S, RowKind.ACCELERATION_S, RowKind.JERK_S, RowKind.PLACE),
+    (RowKind.VELOCITY_L, RowKind.ACCELERATION_L, RowKind.JERK_L, RowKind.PLACE),
+)
+# The nonlinear rows in their order, without and with l unknown; the places are those of the body's ends.
+_NONLINEAR = (
+    (RowKind.CIRCLE, RowKind.ACROSS),
+    (RowKind.CIRCLE, RowKind.ACROSS, RowKind.ALONG, RowKind.CURVATURE, RowKind.PLACE, RowKind.PLACE),
+)
 
 
 @dataclass(frozen=True)
 class Structure:
-    """What a :class:`Model` depends on.
+    """What a :class:`repair.solvers.casadi.model.Model` depends on.
 
     Attributes
     ----------
@@ -87,10 +132,7 @@ def _sub_bernstein(degree: int, start: float, end: float) -> Array:
     for i in range(p + 1):
         for k in range(i, p + 1):
             shift[i, k] = comb(k, i) * start ** (k - i) * (end - start) ** i
-    to_bernstein = np.array(
-        [[comb(i, k) / comb(p, k) if k <= i else 0.0 for k in range(p + 1)] for i in range(p + 1)]
-    )
-    return np.asarray(to_bernstein @ shift @ segment_matrix(p))
+    return np.asarray(to_bernstein(p) @ shift @ segment_matrix(p))
 
 
 @lru_cache(maxsize=256)
@@ -124,10 +166,21 @@ def bernstein_rows(n: int, degree: int, cuts: tuple[int, ...]) -> Array:
 
 @dataclass(frozen=True)
 class Rows:
-    """Linear rows of one axis: ``matrix`` (R, n) times that axis' control points."""
+    """Linear rows of one axis: ``matrix`` (R, n) times that axis' control points.
+
+    Attributes
+    ----------
+    family : str
+        One of ``FAMILIES``.
+    axis : int
+        0 for s, 1 for l.
+    kind : RowKind
+    matrix : (R, n) array
+    """
 
     family: str
     axis: int
+    kind: RowKind
     matrix: Array
 
 
@@ -144,8 +197,20 @@ class Layout:
         Rows on which obstacles are bounded: those of ``position``, or the curve at Greville times.
     tau, samples : (S,) array, tuple of (S, n) array
         Ends of the windows since t_rep [s]; position, velocity and acceleration there.
+    edge : (S + 1,) array
+        Ends of the windows since t_rep [s], the first one's start included.
+    fraction : (p + 1,) array
+        Where in its window each Bernstein point acts, 0 to 1.
+    window_row : (S, p + 1) int array
+        Rows of ``position`` that are the points of each window.
     hessian : (n, n) array
         Of the objective, on either axis.
+    gauss_tau : (K,) array
+        Points of the objective's integration since t_rep [s].
+    reference_weight : (K,) array
+        Weight of the squared distance to the reference there, times 2.
+    pull : (n, K) array
+        Map from the reference's positions there to its pull at the control points.
     linear : list of Rows
         The linear rows by family; ``obstacles`` of l include the road.
     kept : list of int arrays
@@ -154,16 +219,20 @@ class Layout:
         All linear rows that the unknowns can move, over the unknowns; the direction of travel last.
     given : (L, 2 p) array
         The same rows over the given control points, s first.
+    linear_count : int
+        Their number L.
     bounded : list of tuples
         Axis, ``kept`` and place in those rows of each axis' obstacle rows.
     kind : int array
-        What bounds each row, the nonlinear ones included: 0 to 5 velocity, acceleration, jerk of s and
-        l; 6 nothing that is known beforehand; 7 the direction of travel; 8 the friction circle; 9, 10
-        the accelerations across and along; 11 the path's curvature.
+        :class:`RowKind` of each row, the nonlinear ones included.
     order : int array
         0 to 2 for the rows of ``evaluated`` that are velocities, accelerations, jerks.
     evaluated : (E, n) array
         ``velocity``, ``acceleration``, ``jerk``, ``obstacle`` and ``samples`` on top of each other.
+    family_start : (5,) int array
+        Where each of these five begins.
+    sampled_given : (3 S, p) array
+        The samples over the given control points.
     """
 
     def __init__(self, structure: Structure) -> None:
@@ -177,8 +246,7 @@ class Layout:
         self.jerk = bernstein_rows(n - 3, p - 3, (1,) * segments) @ derivative_matrix(n, 3, h)
         self.position = bernstein_rows(n, p, (s.windows,) * segments)
         if s.sampled:
-            greville = (np.arange(p, n) - (p - 1) / 2) * h
-            self.obstacle = basis_matrix(np.minimum(greville, segments * h), n, p, h)
+            self.obstacle = basis_matrix(np.minimum(greville_offsets(n, p, h)[p:], segments * h), n, p, h)
         else:
             self.obstacle = self.position
         self.tau = np.arange(1, segments * s.windows + 1) * (h / s.windows)
@@ -213,20 +281,12 @@ class Layout:
         self.pull = basis[0].T * self.reference_weight  # times the reference's positions at gauss_tau
 
     def _linear_rows(self) -> list[Rows]:
-        rows = [
-            Rows("velocity", 0, self.velocity),
-            Rows("acceleration", 0, self.acceleration),
-            Rows("jerk", 0, self.jerk),
-            Rows("obstacles", 0, self.obstacle),
+        matrices = (self.velocity, self.acceleration, self.jerk, self.obstacle)
+        return [
+            Rows(family, axis, kind, matrix)
+            for axis in range(self.structure.axes)
+            for family, kind, matrix in zip(FAMILIES, _KINDS[axis], matrices, strict=True)
         ]
-        if self.structure.lateral:
-            rows += [
-                Rows("velocity", 1, self.velocity),
-                Rows("acceleration", 1, self.acceleration),
-                Rows("jerk", 1, self.jerk),
-                Rows("obstacles", 1, self.obstacle),
-            ]
-        return rows
 
     def _over_unknowns(self) -> None:
         """The linear rows over the unknowns and over the given control points."""
@@ -235,22 +295,22 @@ class Layout:
         kind: list[int] = []
         self.bounded: list[tuple[int, npt.NDArray[np.intp], slice]] = []
         for rows, kept in zip(self.linear, self.kept, strict=True):
-            picked, place = rows.matrix[kept], FAMILIES.index(rows.family)
-            if rows.family == "obstacles":
+            picked = rows.matrix[kept]
+            if rows.kind == RowKind.PLACE:
                 self.bounded.append((rows.axis, kept, slice(len(kind), len(kind) + len(kept))))
             free.append(np.kron(np.arange(s.axes) == rows.axis, picked[:, p:]))
             given.append(np.kron(np.arange(2) == rows.axis, picked[:, :p]))
-            kind += [6 if rows.family == "obstacles" else 2 * place + rows.axis] * len(kept)
+            kind += [rows.kind] * len(kept)
         if s.lateral:
             moving = self.velocity[self.kept[0]]
             for sign in (-1.0, 1.0):
                 free.append(np.kron([s.tangent, sign], moving[:, p:]))
                 given.append(np.kron([s.tangent, sign], moving[:, :p]))
-            kind += [7] * (2 * len(moving))
+            kind += [RowKind.HEADING] * (2 * len(moving))
         self.free, self.given = np.vstack(free), np.vstack(given)
         self.linear_count = len(self.free)
-        nonlinear = (8, 9, 10, 11, 6, 6) if s.lateral else (8, 9)
-        self.kind = np.concatenate((kind, np.repeat(nonlinear, len(self.tau)))).astype(np.intp)
+        # Plain integers: NumPy indexes with them without a look at the enumeration.
+        self.kind = np.concatenate((kind, np.repeat(_NONLINEAR[s.lateral], len(self.tau)))).astype(np.intp)
 
     def unknowns(self, points: Array) -> Array:
         """The unknowns (m,) among control points (n, 2)."""

@@ -1,0 +1,1 @@
+"""The paper's planner: soft penalties on a uniform B-spline, in two stages."""

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 import time
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs, dtbtrs
 
 from repair.arrays import Array
+from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.ego.spline_cost import SplineCost
 
-__all__ = ["Minimum", "OutOfTime", "lbfgs", "newton"]
+__all__ = ["Minimiser", "Minimum", "OutOfTime", "lbfgs", "minimiser", "newton"]
 
 _SUFFICIENT = 1e-4  # share of the promised decrease that a step must bring (Armijo)
 _SHORTEST = 1e-9
@@ -32,6 +33,30 @@ class Minimum(NamedTuple):
     cost: float
     iterations: int
     converged: bool
+
+
+class Minimiser(Protocol):
+    """A way to the minimum of a cost."""
+
+    def __call__(
+        self, cost: SplineCost, deadline: float | None, *, near_closed_form: bool = False
+    ) -> Minimum:
+        """Minimise; see :func:`newton`."""
+        ...
+
+
+def minimiser(config: EgoConfig) -> Minimiser:
+    """The way that ``config.solver`` names, with its number of iterations and its tolerance."""
+
+    def by_newton(cost: SplineCost, deadline: float | None, *, near_closed_form: bool = False) -> Minimum:
+        limit, tolerance = config.max_iterations, config.tolerance
+        return newton(cost, limit, tolerance, deadline, near_closed_form=near_closed_form)
+
+    def by_lbfgs(cost: SplineCost, deadline: float | None, *, near_closed_form: bool = False) -> Minimum:
+        limit, tolerance = config.max_iterations, config.tolerance
+        return lbfgs(cost, limit, tolerance, deadline, precondition=config.precondition)
+
+    return by_newton if config.solver == "newton" else by_lbfgs
 
 
 def _in_time(deadline: float | None) -> None:
@@ -51,6 +76,7 @@ def newton(
 
     Parameters
     ----------
+    cost : SplineCost
     limit : int
         Largest number of iterations.
     tolerance : float
@@ -64,6 +90,7 @@ def newton(
     Raises
     ------
     OutOfTime
+        If the deadline passes before.
     """
     u, here = np.zeros(cost.size), None
     if near_closed_form and (found := cost.closed_form()) is not None:
@@ -122,8 +149,20 @@ def lbfgs(
 
     Parameters
     ----------
+    cost : SplineCost
+    limit : int
+        Largest number of iterations.
     tolerance : float
         On the largest entry of the gradient by y (by u without ``precondition``).
+    deadline : float, optional
+        Of :func:`time.perf_counter` [s].
+    precondition : bool
+        Take these coordinates.
+
+    Raises
+    ------
+    OutOfTime
+        If the deadline passes before.
     """
     from scipy.optimize import fmin_l_bfgs_b
 

@@ -8,16 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
-from repair.problem.problem import RepairProblem, Side
+from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 
 __all__ = ["Pairs", "anchor_pairs", "closest_distance"]
 
 # NumPy compares with plain integers several times faster than with an enumeration's members.
+# The sides up to this one are about s, the others about l.
 _AHEAD = int(Side.AHEAD)
-# Of each side, in their order: the axis of v, and its sign. Ahead and left lie at the upper corner of the
-# box, behind and right at the lower one.
-_AXIS = np.array([0, 0, 1, 1])
-_SIGN = np.array([-1.0, 1.0, 1.0, -1.0])
 # An array of no dimension is taken by NumPy two or three times faster than a number of Python's.
 _ZERO = np.zeros(())
 
@@ -25,8 +22,18 @@ _ZERO = np.zeros(())
 class Pairs(NamedTuple):
     """The paper's {p, v} pairs, one row each: d = (Q_i - p) . v with v along an axis.
 
-    ``row`` control point, ``axis`` 0 for s and 1 for l, ``sign`` of v on that axis, ``anchor`` the
-    coordinate of p on that axis [m], ``threshold`` the s_f of the pair [m].
+    Attributes
+    ----------
+    row : (P,) int array
+        Control point.
+    axis : (P,) int array
+        0 for s and 1 for l.
+    sign : (P,) array
+        Of v on that axis.
+    anchor : (P,) array
+        Coordinate of p on that axis [m].
+    threshold : (P,) array
+        s_f of the pair [m].
     """
 
     row: np.ndarray
@@ -71,7 +78,7 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
         inside = ((lower < free) & (free < upper)).reshape(-1, 2)
         found = np.where(side <= _AHEAD, inside[:, 1], inside[:, 0]).nonzero()[0]
         chosen = side.take(found)
-        axis, sign = _AXIS.take(chosen), _SIGN.take(chosen)
+        axis, sign = SIDE_AXIS.take(chosen), SIDE_SIGN.take(chosen)
         corner = 2 * found + axis
         anchor = np.where(sign > _ZERO, upper.ravel().take(corner), lower.ravel().take(corner))
         parts.append((found % len(free) + first, axis, sign, anchor, np.full(len(found), problem.clearance)))

@@ -1,0 +1,131 @@
+"""Layers of the configuration: read, laid over each other, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from repair.errors import ConfigError
+
+__all__ = ["Layer", "dotted", "explain", "merged", "read_yaml", "require_sections"]
+
+
+class Layer(NamedTuple):
+    """One layer: what it is called in sentences, and its OmegaConf node."""
+
+    name: str
+    node: Any
+
+
+def read_yaml(path: Path) -> Any:
+    """A YAML file as a node.
+
+    Raises
+    ------
+    ConfigError
+        If it is not there, cannot be read, or holds no mapping.
+    """
+    from omegaconf import DictConfig, OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+    from yaml import YAMLError
+
+    try:
+        layer = OmegaConf.load(path)
+    except FileNotFoundError as error:
+        raise ConfigError(f"configuration file {path} does not exist") from error
+    except (OSError, YAMLError, OmegaConfBaseException, ValueError, RecursionError) as error:
+        cause = " ".join(str(error).split())[:200] or type(error).__name__
+        raise ConfigError(f"configuration file {path} cannot be read: {cause}") from error
+    if not isinstance(layer, DictConfig):
+        raise ConfigError(f"configuration file {path} must hold a mapping of keys")
+    return layer
+
+
+def dotted(overrides: Iterable[str] | Mapping[str, Any]) -> Any:
+    """``key=value`` texts, or a mapping of dotted keys, as a node.
+
+    Raises
+    ------
+    ConfigError
+        Naming what cannot be read.
+    """
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+    from yaml import YAMLError
+
+    if isinstance(overrides, Mapping):
+        layer = OmegaConf.create()
+        for key, value in overrides.items():
+            try:
+                OmegaConf.update(layer, key, _plain(value))
+            except (OmegaConfBaseException, ValueError, TypeError, AttributeError) as error:
+                message = str(error).splitlines()[0]
+                raise ConfigError(f"overrides: configuration key {key!r} is {value!r}: {message}") from error
+        return layer
+    items = list(overrides)
+    for item in items:
+        if not isinstance(item, str) or "=" not in item or not item.split("=", 1)[0].strip():
+            raise ConfigError(f"override {item!r} must have the form key=value")
+    try:
+        return OmegaConf.from_dotlist(items)
+    except (YAMLError, ValueError, TypeError) as error:
+        raise ConfigError(f"overrides {items} cannot be read: {str(error).splitlines()[0]}") from error
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's scalars and arrays as Python's own numbers and lists; OmegaConf refuses them."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
+        return value.tolist()
+    return value
+
+
+def require_sections(layer: Layer, schema: Any, prefix: str = "", node: Any = None) -> None:
+    """Refuse a plain value where the schema has a section: OmegaConf's own error does not name the key."""
+    from omegaconf import DictConfig
+
+    node = layer.node if node is None else node
+    for key in node:
+        expected = schema._get_node(key) if key in schema else None
+        if isinstance(expected, DictConfig):
+            value = node._get_node(key)
+            if not isinstance(value, DictConfig) or value._is_none():
+                shown = "empty" if value._is_none() else str(value)
+                named = f"{layer.name}: configuration key '{prefix}{key}' is {shown}"
+                raise ConfigError(f"{named}; it must hold a mapping of keys")
+            if not value._is_interpolation():
+                require_sections(layer, expected, f"{prefix}{key}.", value)
+
+
+def merged(name: str, *nodes: Any, known: Callable[[], Collection[str]]) -> Any:
+    """Nodes laid over each other; ``known`` gives the keys there are.
+
+    Raises
+    ------
+    ConfigError
+        In the name of the layer, naming the key.
+    """
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    try:
+        return OmegaConf.merge(*nodes)
+    except (OmegaConfBaseException, ValueError, TypeError) as error:
+        raise ConfigError(explain(name, error, known())) from error
+
+
+def explain(layer: str, error: Exception, known: Collection[str]) -> str:
+    """OmegaConf's error as a sentence about a key."""
+    key = getattr(error, "full_key", None) or ""
+    message = str(error).splitlines()[0].rstrip(".")
+    if "not in" in message and key:
+        import difflib
+
+        close = difflib.get_close_matches(key, sorted(known), n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        return f"{layer}: there is no configuration key {key!r}{hint}"
+    return f"{layer}: configuration key {key!r}: {message}" if key else f"{layer}: {message}"

@@ -1,0 +1,160 @@
+"""Presets, files and overrides resolved into a configuration. Unknown keys and wrong types are errors.
+
+Later layers win: defaults < preset < file < ``key=value`` overrides < the ``for_backend`` section of the
+chosen backend. A preset uses ``for_backend`` where a published setting belongs to one backend only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from repair.config.layers import Layer, dotted, explain, merged, read_yaml, require_sections
+from repair.config.schema import Config, configuration_keys, key_names, schema, values_of, words_of
+from repair.errors import ConfigError
+from repair.settings import require_sane
+
+__all__ = ["RETIRED", "load_config", "preset_names", "preset_path", "recorded_config"]
+
+_PRESETS = Path(__file__).with_name("presets")
+#: Keys that earlier versions wrote into result files, and that never had an effect.
+RETIRED = frozenset({"seed"})
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the bundled presets."""
+    return tuple(sorted(p.stem for p in _PRESETS.glob("*.yaml")))
+
+
+def preset_path(name: str) -> Path:
+    """The file of a bundled preset.
+
+    Raises
+    ------
+    ConfigError
+        If there is none of that name; the sentence lists those that there are.
+    """
+    if name not in preset_names():
+        raise ConfigError(f"preset {name!r} is unknown; there are {', '.join(preset_names())}")
+    return _PRESETS / f"{name}.yaml"
+
+
+def load_config(
+    preset: str | None = None,
+    file: str | Path | None = None,
+    overrides: Iterable[str] | Mapping[str, Any] = (),
+    **named: Any,
+) -> Config:
+    """Resolve a configuration.
+
+    Parameters
+    ----------
+    preset : str, optional
+        Name of a bundled preset (see :func:`preset_names`).
+    file : path, optional
+        YAML file of the same schema.
+    overrides : iterable of ``"key=value"`` or mapping of dotted keys
+        Last word on everything except what ``for_backend`` says.
+    **named
+        Top-level keys (``backend="casadi"``).
+
+    Raises
+    ------
+    ConfigError
+        Naming the key, what it got and what it expects.
+    """
+    layers: list[Layer] = []
+    if preset is not None:
+        layers.append(Layer(f"preset {preset}", read_yaml(preset_path(preset))))
+    if file is not None:
+        layers.append(Layer(str(file), read_yaml(Path(file))))
+    own = [Layer("overrides", dotted(overrides)), Layer("overrides", dotted(_named(named)))]
+    config = _resolved(layers, own)
+    _require_effect(config)
+    return config
+
+
+def recorded_config(values: Mapping[str, Any]) -> Config:
+    """The configuration that :meth:`Config.to_dict` gave, in this version or an earlier one.
+
+    Nothing in it counts as set on purpose: what had no effect then has none now.
+
+    Raises
+    ------
+    ConfigError
+        Naming a key that there is not any more, or its value.
+    """
+    kept = {key: value for key, value in values.items() if key not in RETIRED}
+    return _resolved([Layer("the configuration of the result", dotted(kept))], [])
+
+
+def _resolved(layers: list[Layer], own: list[Layer]) -> Config:
+    """Layers laid over each other, those that the user gave on purpose last."""
+    from omegaconf import OmegaConf
+
+    found = keys = schema()
+    for layer in (*layers, *own):
+        require_sections(layer, keys)
+    for layer in (*layers, *own):
+        found = merged(layer.name, found, layer.node, known=key_names)
+    config = _validated(_with_backend_section(found, own))
+    config.given = frozenset(name for layer in own for name in _leaves(OmegaConf.to_container(layer.node)))
+    return config
+
+
+def _named(keys: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in keys.items() if value is not None}
+
+
+def _leaves(node: Any, prefix: str = "") -> Iterator[str]:
+    """Dotted names of everything in nested mappings that is no mapping."""
+    for name, value in node.items():
+        if isinstance(value, Mapping) and prefix + name != "for_backend":
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}"
+
+
+def _with_backend_section(found: Any, explicit: list[Layer]) -> Any:
+    """Lay ``for_backend.<backend>`` over the rest, and what the user said explicitly over that."""
+    from omegaconf import OmegaConf
+
+    section = found.for_backend.get(found.backend)
+    found.for_backend = {}
+    if section is None:
+        return found
+    name = f"for_backend.{found.backend}"
+    if not OmegaConf.is_dict(section):
+        raise ConfigError(f"configuration key {name!r} is {section!r}; it must hold a mapping of keys")
+    require_sections(Layer(name, section), schema())
+    return merged(name, found, section, *(layer.node for layer in explicit), known=key_names)
+
+
+def _validated(found: Any) -> Config:
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    try:
+        config: Any = OmegaConf.to_object(found)
+    except OmegaConfBaseException as error:
+        raise ConfigError(explain("configuration", error, key_names())) from error
+    for key, value in zip(configuration_keys(), values_of(config).values(), strict=True):
+        require_sane(key, value, words_of(key))
+    assert isinstance(config, Config)
+    return config
+
+
+def _require_effect(config: Config) -> None:
+    """Refuse what names something that is then not looked at; the rest of it becomes notes.
+
+    Raises
+    ------
+    ConfigError
+        If ``reference.file`` or ``reference.obstacle_id`` is set for a source that takes none.
+    """
+    for key, other, value in config.without_effect():
+        if key in ("reference.file", "reference.obstacle_id") and values_of(config)[key] is not None:
+            raise ConfigError(
+                f"configuration key {key!r} has no effect with {other}={value}; take it out, or set {other}"
+            )

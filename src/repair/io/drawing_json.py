@@ -1,0 +1,102 @@
+"""A drawing as plain values, and back. What is not there at a time is ``null``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from repair.arrays import Array, column, frozen
+from repair.outcome.data import Body, Box, Drawing, Line
+
+__all__ = ["drawing_from", "drawing_to_dict"]
+
+_COLUMNS = ("t", "s", "l", "x", "y", "speed", "acceleration")
+
+
+def drawing_to_dict(drawing: Drawing) -> dict[str, Any]:
+    """Plain Python values: no NaN, no array."""
+    return {
+        "schema": 1,
+        "start_s_m": drawing.start_s,
+        "s_offset_m": drawing.s_offset,
+        "until_s": drawing.until,
+        "steps": list(drawing.steps),
+        "body": _rows(drawing.body),
+        "ego": _rows(drawing.ego),
+        "unrepaired": None if drawing.unrepaired is None else column(drawing.unrepaired),
+        "lines": [
+            {"kind": x.kind, "name": x.name, "t_rep_s": x.t_rep}
+            | {name: column(getattr(x, name)) for name in _COLUMNS}
+            for x in drawing.lines
+        ],
+        "boxes": [
+            {"id": x.id, "t": column(x.t), "low": column(x.low), "high": column(x.high)}
+            for x in drawing.boxes
+        ],
+        "bodies": [
+            {
+                "id": x.id,
+                "role": x.role,
+                "centres": _rows(x.centres),
+                "outlines": {str(step): _rows(outline) for step, outline in x.outlines.items()},
+            }
+            for x in drawing.bodies
+        ],
+        "areas": [_rows(x) for x in drawing.areas],
+        "edges": [_rows(x) for x in drawing.edges],
+    }
+
+
+def drawing_from(content: Mapping[str, Any]) -> Drawing:
+    """The drawing that :func:`drawing_to_dict` made.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        If it is incomplete or of another shape.
+    """
+    drawing = Drawing(
+        start_s=float(content["start_s_m"]),
+        s_offset=float(content["s_offset_m"]),
+        until=float(content["until_s"]),
+        steps=tuple(int(step) for step in content["steps"]),
+        body=_array(content["body"], 2),
+        ego=_array(content["ego"], 3),
+        unrepaired=None if content["unrepaired"] is None else _array(content["unrepaired"]),
+        lines=tuple(
+            Line(
+                str(x["kind"]), str(x["name"]), None if x["t_rep_s"] is None else float(x["t_rep_s"]),
+                *(_array(x[name]) for name in _COLUMNS),
+            )
+            for x in content["lines"]
+        ),
+        boxes=tuple(
+            Box(int(x["id"]), _array(x["t"]), _array(x["low"]), _array(x["high"])) for x in content["boxes"]
+        ),
+        bodies=tuple(
+            Body(
+                int(x["id"]), str(x["role"]), _array(x["centres"], 2),
+                {int(step): _array(outline, 2) for step, outline in x["outlines"].items()},
+            )
+            for x in content["bodies"]
+        ),
+        areas=tuple(_array(x, 2) for x in content["areas"]),
+        edges=tuple(_array(x, 2) for x in content["edges"]),
+    )  # fmt: skip
+    if not drawing.steps or not drawing.lines:
+        raise ValueError("it has no lines")
+    return drawing
+
+
+def _rows(values: Array) -> list[list[float | None]]:
+    return [column(row) for row in np.atleast_2d(values)] if len(values) else []
+
+
+def _array(values: Any, width: int | None = None) -> Array:
+    made = frozen([[np.nan if v is None else v for v in row] if width else (np.nan if row is None else row)
+                   for row in values])  # fmt: skip
+    if width is None:
+        return made.reshape(-1)
+    return made.reshape(-1, width)

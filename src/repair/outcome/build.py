@@ -1,0 +1,31 @@
+"""From a search to its outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from repair.backend.base import Capabilities
+from repair.check.peaks import Peaks
+from repair.metrics.base import MetricValue
+from repair.outcome.data import Outcome
+from repair.outcome.draw import drawing_of
+from repair.outcome.record import record_of
+from repair.prepare import Prepared
+from repair.search.result import SearchResult
+from repair.vehicle.states import DrivenStates
+
+__all__ = ["outcome_of"]
+
+
+def outcome_of(
+    prepared: Prepared,
+    found: SearchResult,
+    states: DrivenStates,
+    peaks: Peaks | None,
+    phases: Mapping[str, float],
+    metrics: Mapping[str, MetricValue],
+    capabilities: Capabilities,
+) -> Outcome:
+    """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
+    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities)
+    return Outcome(record, drawing_of(prepared, found, states))

@@ -1,0 +1,167 @@
+"""What the figures show, taken from a search while the vehicle can still be driven."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from repair.arrays import Array, frozen
+from repair.curves.base import Curve, SplicedCurve
+from repair.outcome.data import Body, Box, Drawing, Line
+from repair.prepare import Prepared
+from repair.scene.traffic.obstacle import Obstacle
+from repair.search.result import SearchResult, SearchStatus
+from repair.timegrid import INSTANT
+from repair.vehicle.states import DrivenStates
+
+__all__ = ["drawing_of"]
+
+_DIGITS = 4  # of metres and seconds: what is read from a file is what was drawn at once
+_AROUND = 20.0  # road and traffic are shown at least this far beyond what is driven [m]
+_STAYS = 0.5  # who moves less than this in all stands [m]
+
+
+def drawing_of(prepared: Prepared, found: SearchResult, states: DrivenStates) -> Drawing:
+    """Lines, boxes, road and traffic of a result.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    found : SearchResult
+    states : DrivenStates
+        What is driven, at the scenario's steps.
+    """
+    scene, dt = prepared.scene, prepared.scene.dt
+    until = prepared.t_end if found.probes else prepared.t_reference
+    at = found.conflict.time if np.isfinite(found.conflict.time) else prepared.t_end
+    moment, end = round(at / dt), round(until / dt)
+    # The conflict first: where labels would cover each other, the earlier one stays.
+    steps = tuple(dict.fromkeys([moment, 0, end, moment // 2]))
+    lines = _lines(prepared, found, until)
+    driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
+    seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])
+    # A figure is at least as high as a fifth of its width, and shows that much road.
+    around = _AROUND + float(np.ptp(seen, axis=0).max())
+    low, high = seen.min(axis=0) - around, seen.max(axis=0) + around
+    areas, edges = _road(scene.scenario.lanelet_network, low, high)
+    settings = prepared.config.scene
+    return Drawing(
+        start_s=round(float(scene.start[0, 0]), _DIGITS),
+        s_offset=scene.vehicle.half_length if settings.s_offset is None else settings.s_offset,
+        until=round(float(until), _DIGITS),
+        steps=steps,
+        body=_rounded(scene.vehicle.corners),
+        ego=driven,
+        unrepaired=_unrepaired(prepared, found, moment),
+        lines=lines,
+        boxes=_boxes(prepared, max(float(line.t[-1]) for line in lines if len(line.t))),
+        bodies=tuple(
+            body
+            for obstacle in scene.obstacles
+            if (body := _body(obstacle, steps, end, low, high, found.conflict.obstacle_id)) is not None
+        ),
+        areas=areas,
+        edges=edges,
+    )
+
+
+def _rounded(values: Array) -> Array:
+    return frozen(np.round(values, _DIGITS) + 0.0)
+
+
+def _lines(prepared: Prepared, found: SearchResult, until: float) -> tuple[Line, ...]:
+    lines = [_line(prepared, prepared.reference, None, "reference", "", until)]
+    for probe in found.probes:
+        if probe.solve.curve is None:
+            continue
+        lines.append(_line(prepared, probe.solve.curve, probe.t_rep, "repair", "", until))
+        for name, curve in probe.solve.stages.items():
+            lines.append(_line(prepared, curve, probe.t_rep, "stage", name, until))
+    return tuple(lines)
+
+
+def _line(prepared: Prepared, curve: Curve, t_rep: float | None, kind: str, name: str, until: float) -> Line:
+    """Sample a curve from ``t_rep`` on, or the reference from 0; the dense samples of the checker."""
+    t_end = prepared.t_end if t_rep is not None else prepared.t_reference
+    whole = curve if t_rep is None else SplicedCurve(prepared.reference, curve, t_rep)
+    samples = whole.sample(prepared.checker.times(t_end))
+    path = prepared.scene.frame.cartesian(samples)
+    acceleration = np.gradient(path.speed, path.t) if len(path.t) > 2 else np.zeros(len(path.t))
+    k = path.t >= (t_rep or 0.0) - INSTANT
+    if t_rep is None:
+        k &= path.t <= until + INSTANT
+    columns = (path.t, *samples.position.T, *path.xy.T, path.speed, acceleration)
+    return Line(kind, name, t_rep, *(_rounded(column[k]) for column in columns))
+
+
+def _boxes(prepared: Prepared, t_end: float) -> tuple[Box, ...]:
+    """The s-interval of every box while it covers the reference's l: where the ego, a point, must not be."""
+    occupancy = prepared.occupancy
+    if not len(occupancy):
+        return ()
+    keep = occupancy.t <= t_end + INSTANT
+    t, lower, upper = occupancy.t[keep], occupancy.lower[:, keep], occupancy.upper[:, keep]
+    sideways = prepared.reference.sample(t).position[:, 1]
+    in_the_way = (lower[..., 1] < sideways) & (sideways < upper[..., 1])
+    return tuple(
+        Box(
+            int(occupancy.ids[k]),
+            _rounded(t),
+            _rounded(np.where(in_the_way[k], lower[k, :, 0], np.nan)),
+            _rounded(np.where(in_the_way[k], upper[k, :, 0], np.nan)),
+        )
+        for k in np.flatnonzero(in_the_way.any(axis=1))
+    )
+
+
+def _road(network: object, low: Array, high: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Lanelets that meet a rectangle: their areas, and their bounds."""
+    areas, edges = [], []
+    for lanelet in network.lanelets:  # type: ignore[attr-defined]
+        left, right = lanelet.left_vertices[:, :2], lanelet.right_vertices[:, :2]
+        outline = np.vstack([left, right[::-1]])
+        if (outline.max(axis=0) >= low).all() and (outline.min(axis=0) <= high).all():
+            areas.append(_rounded(outline))
+            edges += [_rounded(left), _rounded(right)]
+    return tuple(areas), tuple(edges)
+
+
+def _outline(obstacle: Obstacle, step: int) -> Array | None:
+    """Outline (V, 2) of an obstacle at a step, None where it is absent."""
+    if step > obstacle.n_steps:
+        return None
+    points = obstacle.vertices[step]
+    points = points[np.isfinite(points).all(axis=1)]
+    return points if len(points) else None
+
+
+def _body(
+    obstacle: Obstacle, steps: tuple[int, ...], end: int, low: Array, high: Array, opponent: int | None
+) -> Body | None:
+    """An obstacle that is shown; None for one that stays out of the picture."""
+    shown = {
+        step: _rounded(outline)
+        for step in steps
+        if (obstacle.id == opponent or step == steps[0]) and (outline := _outline(obstacle, step)) is not None
+    }
+    middles = np.full((end + 1, 2), np.nan)
+    for step in range(end + 1):
+        outline = _outline(obstacle, step)
+        if outline is not None:
+            middles[step] = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+    there = middles[np.isfinite(middles).all(axis=1)]
+    near = ((low < there) & (there < high)).all(axis=1).any()
+    if not near and obstacle.id != opponent:
+        return None
+    moves = len(there) > 1 and np.ptp(there, axis=0).max() >= _STAYS
+    return Body(obstacle.id, obstacle.role, _rounded(middles if moves else middles[:1]), shown)
+
+
+def _unrepaired(prepared: Prepared, found: SearchResult, moment: int) -> Array | None:
+    """The ego on the reference at the conflict, where it is repaired."""
+    if found.status is not SearchStatus.FOUND:
+        return None
+    driven = prepared.checker.drive(prepared.reference, prepared.t_reference)
+    driven = driven.every(prepared.config.checker.substeps)
+    if moment >= len(driven):
+        return None
+    return _rounded(np.array([driven.x[moment], driven.y[moment], driven.orientation[moment]]))

@@ -1,0 +1,134 @@
+"""Things by name: those of the package, those that a program registers, those of installed packages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import import_module
+from typing import Any, Generic, TypeVar
+
+from repair.errors import RepairError
+
+__all__ = ["Registry", "loaded"]
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """A table from names to things of one kind.
+
+    Parameters
+    ----------
+    kind : str
+        What the things are, for sentences: ``backend``.
+    own : mapping
+        The things of the package.
+    error : type
+        The :class:`repair.RepairError` that is raised about names.
+    group : str, optional
+        Entry-point group in which installed packages offer more of them. An entry point that cannot be
+        loaded is kept with its reason, and is an error only for who asks for it.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        own: Mapping[str, T],
+        *,
+        error: type[RepairError] = RepairError,
+        group: str | None = None,
+    ) -> None:
+        self.kind, self.error, self.group = kind, error, group
+        self._own = dict(own)
+        self._registered: dict[str, T] = {}
+        self._offered: dict[str, T] | None = None
+        self._broken: dict[str, str] = {}
+
+    def register(self, name: str, thing: T) -> None:
+        """Add a thing for this process.
+
+        Raises
+        ------
+        RepairError
+            If the name is taken, or is no identifier.
+        """
+        if not isinstance(name, str) or not name.isidentifier():
+            raise self.error(f"a {self.kind} needs a name that is an identifier, not {name!r}")
+        if name in self._everything():
+            raise self.error(f"there is a {self.kind} {name!r} already; register yours under another name")
+        self._registered[name] = thing
+
+    def unregister(self, name: str) -> None:
+        """Take back what :meth:`register` added; nothing happens where it did not."""
+        self._registered.pop(name, None)
+
+    def names(self) -> tuple[str, ...]:
+        """All names, those of the package first; installed ones that cannot be loaded are not among them."""
+        return tuple(self._everything())
+
+    def broken(self) -> dict[str, str]:
+        """Names that installed packages offer in vain, each with the reason."""
+        self._everything()
+        return dict(self._broken)
+
+    def items(self) -> tuple[tuple[str, T], ...]:
+        """Names and things."""
+        return tuple(self._everything().items())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._everything()
+
+    def __getitem__(self, name: str) -> T:
+        """The thing of that name.
+
+        Raises
+        ------
+        RepairError
+            If there is none; the sentence lists those that there are.
+        """
+        known = self._everything()
+        if name in known:
+            return known[name]
+        if name in self._broken:
+            raise self.error(
+                f"{self.kind} {name!r} of an installed package cannot be loaded: {self._broken[name]}"
+            )
+        raise self.error(f"{self.kind} {name!r} is unknown; there are {', '.join(known)}")
+
+    def _everything(self) -> dict[str, T]:
+        if self._offered is None:
+            self._offered = self._load() if self.group else {}
+        return {**self._own, **self._offered, **self._registered}
+
+    def _load(self) -> dict[str, T]:
+        found: dict[str, T] = {}
+        for name, point in sorted(_entry_points().get(self.group or "", {}).items()):
+            if name in self._own:
+                self._broken[name] = f"the package has a {self.kind} of that name itself"
+                continue
+            try:
+                found[name] = point.load()
+            except Exception as error:  # whatever a foreign package raises on import
+                self._broken[name] = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        return found
+
+
+def loaded(thing: str | T) -> T:
+    """A thing, or what a ``"module:name"`` names: imported when it is needed."""
+    if not isinstance(thing, str):
+        return thing
+    module, _, name = thing.partition(":")
+    found: T = getattr(import_module(module), name)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _entry_points() -> dict[str, dict[str, Any]]:
+    """Entry points of all ``repair.*`` groups, by group and name; looked up once in a process."""
+    from importlib.metadata import entry_points
+
+    found: dict[str, dict[str, Any]] = {}
+    for group in (g for g in entry_points().groups if g.startswith("repair.")):
+        for point in entry_points(group=group):
+            found.setdefault(group, {}).setdefault(point.name, point)
+    return found

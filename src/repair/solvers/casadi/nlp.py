@@ -1,0 +1,121 @@
+"""The NLP in CasADi's symbols: its nonlinear rows, its exact or positive definite Hessian, its solver.
+
+Everything that is linear in the control points is a constant matrix
+(:mod:`repair.solvers.casadi.rows`); only the accelerations and the curvature of the driven path, and
+where the ends of the body are, are nonlinear.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from repair.solvers.casadi.buffered import Deadline, deadline_callback, sparse
+from repair.solvers.casadi.rows import SAMPLED, Datum, Layout, Structure
+
+__all__ = ["STANDSTILL", "make_nlp"]
+
+STANDSTILL = 0.01  #: added to the squared speed [m²/s²] where the path's curvature divides by it
+
+
+def make_nlp(layout: Layout, hessian: Any, matrix: Any) -> tuple[Any, Deadline | None]:
+    """The function that solves the NLP of a layout.
+
+    Parameters
+    ----------
+    layout : Layout
+    hessian, matrix : casadi.DM
+        Of the objective, and the linear rows, over the unknowns.
+
+    Returns
+    -------
+    casadi.Function
+        Parameters are the samples' data, row by row (:class:`repair.solvers.casadi.rows.Datum`), and the
+        linear part of the objective.
+    Deadline or None
+        The watch over it, if it is timed.
+
+    Raises
+    ------
+    RuntimeError
+        Of CasADi, where it cannot make the solver.
+    """
+    import casadi as ca
+
+    s, p = layout.structure, layout.structure.degree
+    m = s.n - p
+    x = ca.SX.sym("x", m * s.axes)
+    count = len(layout.tau)
+    data = ca.SX.sym("data", count, SAMPLED)
+    slope = ca.SX.sym("slope", m * s.axes)
+    objective = 0.5 * ca.bilin(hessian, x, x) + ca.dot(slope, x)
+    axes = [x[k * m : (k + 1) * m] for k in range(s.axes)]
+    along, across, rest = _nonlinear(layout, axes, data)
+    g = ca.vertcat(ca.mtimes(matrix, x), along**2 + across**2, across, *rest)
+    nlp = {"x": x, "p": ca.vertcat(ca.vec(data), slope), "f": objective, "g": g}
+    curvature = None
+    if s.solver != "ipopt":
+        # The objective's own Hessian and the friction circles' J'J, positive definite always.
+        factor, multiplier = ca.SX.sym("factor"), ca.SX.sym("multiplier", g.numel())
+        circle = ca.fmax(multiplier[matrix.shape[0] : matrix.shape[0] + count], 0.0)
+        bent = factor * hessian
+        for part in (along, across):
+            slope_of = ca.jacobian(part, x)
+            bent += 2.0 * ca.mtimes(slope_of.T, ca.repmat(circle, 1, x.numel()) * slope_of)
+        names = ["x", "p", "lam_f", "lam_g"]
+        curvature = ca.Function("curvature", [x, nlp["p"], factor, multiplier], [bent], names, ["hess"])
+    return _solver(s, nlp, curvature)
+
+
+def _nonlinear(layout: Layout, axes: list[Any], data: Any) -> tuple[Any, Any, list[Any]]:
+    """Accelerations, curvature of the driven path, ends of the body at the samples.
+
+    With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the
+    acceleration (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2). The ends of a straight
+    body of half length d lie at l - kappa d^2 / 2 +- d sin(heading).
+    """
+    import casadi as ca
+
+    p = layout.structure.degree
+    free = [sparse(b[:, p:]) for b in layout.samples]
+    s, v, a = (ca.mtimes(free[k], axes[0]) + data[:, Datum.S + k] for k in range(3))
+    if layout.structure.lateral:
+        l, w, b = (ca.mtimes(free[k], axes[1]) + data[:, Datum.L + k] for k in range(3))  # noqa: E741
+    else:
+        l, w, b = (data[:, Datum.L + k] for k in range(3))  # noqa: E741
+    slope = data[:, Datum.BEND_SLOPE]
+    kappa = data[:, Datum.BEND] + slope * s
+    scale = 1.0 - kappa * l
+    along = scale * a - 2.0 * kappa * v * w - slope * l * v**2
+    across = b + scale * kappa * v**2
+    rest = []
+    if layout.structure.lateral:
+        forward = scale * v
+        square = forward**2 + w**2 + STANDSTILL
+        middle = l - 0.5 * layout.structure.overhang**2 * kappa
+        swing = layout.structure.overhang * w / square**0.5
+        rest = [along, (forward * across - w * along) / square**1.5, middle + swing, middle - swing]
+    return along, across, rest
+
+
+def _solver(s: Structure, nlp: dict[str, Any], curvature: Any) -> tuple[Any, Deadline | None]:
+    """The function, and the watch over it."""
+    import casadi as ca
+
+    watch: Deadline | None = None
+    options: dict[str, Any] = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
+    if s.timed:
+        watch = deadline_callback(nlp)
+        options["iteration_callback"] = watch.callback
+    if s.solver == "ipopt":
+        options["ipopt"] = {
+            "print_level": 0, "sb": "yes", "max_iter": s.max_iterations, "tol": s.tolerance,
+            "constr_viol_tol": 1e-8, "bound_relax_factor": 0.0, "mu_strategy": "adaptive",
+        }  # fmt: skip
+    else:
+        options |= {
+            "print_header": False, "print_iteration": False, "print_status": False,
+            "max_iter": s.max_iterations, "tol_pr": 1e-8, "tol_du": max(s.tolerance, 1e-6),
+            "qpsol": "daqp", "qpsol_options": {"error_on_fail": False},
+            "hessian_approximation": "exact", "hess_lag": curvature,
+        }  # fmt: skip
+    return ca.nlpsol("repair", s.solver, nlp, options), watch

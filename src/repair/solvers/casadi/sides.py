@@ -1,0 +1,114 @@
+"""On which sides of the obstacles the curve may pass: the sides for which the linear rows have a solution."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.solvers.casadi.instance import Instance, guide_of
+from repair.solvers.casadi.residuals import residuals_of
+from repair.solvers.casadi.separation import SIDE_OF_BOUND, Separation, separate
+
+__all__ = ["Opening", "open_sides"]
+
+_SIDES = 4  # sets of sides that are tried
+
+
+class Opening(NamedTuple):
+    """What was found for some sides of passing.
+
+    Attributes
+    ----------
+    separation : Separation
+        The last sides that were tried.
+    points : (n, 2) array
+        Control points less the origin: the optimum of the linear rows, where they have one.
+    why : str
+        Why there is none; empty where there is.
+    closest : (points, residuals) or None
+        The curve that keeps all rows but the obstacles' and misses those by the least, and what it
+        violates; None where none was looked for.
+    """
+
+    separation: Separation
+    points: Array
+    why: str
+    closest: tuple[Array, dict[str, float]] | None
+
+
+def open_sides(instance: Instance, points: Array) -> Opening:
+    """Sides of passing for which the linear rows have a solution, that solution, or why there is none.
+
+    The guide's sides come first. Where they contradict the limits, the curve that misses the
+    obstacles by the least is asked for its sides instead, and so on.
+
+    Parameters
+    ----------
+    instance : Instance
+        Its ``relaxed`` is set where there is a solution.
+    points : (n, 2) array
+        Control points to begin with, less the origin.
+    """
+    model, problem, windows = instance.model, instance.problem, instance.windows
+    slope = instance.slope
+    moment = windows.moment
+    shape = guide_of(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
+    if not problem.lateral:
+        shape[..., 1] = (model.obstacle @ points)[windows.row, 1]
+    room = instance.room(shape)
+    why, before = "", None
+    closest: tuple[Array, dict[str, float]] | None = None
+    for _ in range(_SIDES):
+        separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
+        if separation.why:
+            return Opening(separation, points, separation.why, closest)
+        side = separation.side
+        if before is not None and side is not None and np.array_equal(side, before):
+            break
+        before = side
+        gap = _gap_in(separation)
+        why = why or gap
+        low, high = instance.bounds(separation, None)
+        x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
+        if x is not None:
+            points = instance.relaxed = model.with_unknowns(points, x)
+        if possible:
+            return Opening(separation, points, "", closest)
+        modest = instance.bounds(separation, None, modest=True)
+        elastic = model.elastic(slope, *modest) or model.elastic(slope, low, high)
+        if elastic is None:
+            why = why or "no curve from the start state keeps the limits and the road"
+            return Opening(separation, points, why, closest)
+        points = model.with_unknowns(points, elastic[0])
+        if closest is None or elastic[1] < closest[1]["obstacles"]:
+            closest = points, residuals_of(instance, separation, points) | {"obstacles": float(elastic[1])}
+        why = why or _missed(instance, separation, points, elastic[1])
+        shape = instance.shape(points)
+        room = instance.room(shape)
+    return Opening(separation, points, why, closest)
+
+
+def _missed(instance: Instance, separation: Separation, points: Array, miss: float) -> str:
+    """The obstacle that is missed by the most, as a sentence."""
+    position = instance.model.obstacle @ points + instance.origin
+    depth = np.array((separation.lower - position, position - separation.upper))
+    row = int(np.argmax(np.max(depth, axis=(0, 2)) > 0.99 * miss - 1e-6))
+    end, axis = np.unravel_index(int(np.argmax(depth[:, row])), (2, 2))
+    side = SIDE_OF_BOUND[int(axis)][int(end)]
+    return (
+        f"passing as the guide does, every curve within the limits comes at least {miss:.2f} m too close to "
+        f"{separation.who(row, side)} (t = {separation.times[row]:.2f} s)"
+    )
+
+
+def _gap_in(separation: Separation) -> str:
+    """The first place where the bounds leave nothing, as a sentence; empty where there is none."""
+    closed = separation.lower > separation.upper + 2e-7
+    if not closed.any():
+        return ""
+    row, axis = (int(i[0]) for i in np.nonzero(closed))
+    below, above = (separation.who(row, side) for side in SIDE_OF_BOUND[axis])
+    who = f"{below} and {above} leave" if below != above else f"{below} alone leaves"
+    return f"{who} no gap at t = {separation.times[row]:.2f} s"
