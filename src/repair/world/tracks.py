@@ -1,9 +1,9 @@
-"""Obstacles as rows of shapes, and the ego's samples in blocks."""
+"""Obstacles as tracks of shapes over the samples, and the ego's samples in blocks."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,40 +13,163 @@ from repair.arrays import Array, Points
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
 
-__all__ = ["CIRCLE", "POLYGON", "RECTANGLE", "Index", "as_complex", "block_samples", "shape_rows"]
+__all__ = [
+    "AFTER",
+    "BEFORE",
+    "CIRCLE",
+    "INSTANT",
+    "MOVING",
+    "POLYGON",
+    "RECTANGLE",
+    "Index",
+    "Track",
+    "as_complex",
+    "block_samples",
+    "shape_rows",
+    "tracks_of",
+]
 
 Index = npt.NDArray[np.intp]
 """Places in an array."""
 
 RECTANGLE, CIRCLE, POLYGON = range(3)
+#: Between the steps a track moves, or is held from the step before or after, or is there at the steps alone.
+MOVING, BEFORE, AFTER, INSTANT = range(4)
+_RIGID = 1e-3  # polygons whose corners keep their places this well [m] move as one body
+
+_Parts = tuple[Array, ...]
 
 
-def shape_rows(obstacle: Obstacle) -> tuple[int, Array]:
-    """What an obstacle is made of, and its size and place over time.
+class Track(NamedTuple):
+    """One way in which an obstacle is there.
 
-    Returns
-    -------
-    kind : int
-        ``RECTANGLE``, ``CIRCLE`` or ``POLYGON``.
-    rows : (T, 5) array
-        ``x, y, heading, half length, half width``; circles, and the circumcircles of polygons, have
-        their radius as both halves.
+    Attributes
+    ----------
+    kind, mode : int
+        ``RECTANGLE``, ``CIRCLE`` or ``POLYGON``; ``MOVING``, ``BEFORE``, ``AFTER`` or ``INSTANT``.
+    rows : (S, 5) array
+        ``x, y, heading, half length, half width`` at the samples; circles, and the circumcircles of polygons,
+        have their radius as both halves. NaN where it is not there.
+    steps : (S,) int array
+        Scenario step whose polygons hold at a sample.
+    polygons : tuple
+        For each step the convex parts, seen from the row's pose.
     """
+
+    kind: int
+    mode: int
+    rows: Array
+    steps: Index
+    polygons: tuple[_Parts, ...] = ()
+
+
+def tracks_of(obstacle: Obstacle, n_samples: int, substeps: int) -> list[Track]:
+    """The tracks of an obstacle.
+
+    A set holds from its step to the next and from the step before: what is stated there is their union.
+    Polygons that do not move as one body are held likewise, with the hull of both for what lies between.
+    """
+    sample = np.arange(n_samples)
+    before, after = sample // substeps, -(-sample // substeps)
+    kind, rows, polygons = shape_rows(obstacle)
+    held = obstacle.role == "set_based"
+    rigid = _as_one_body(obstacle, rows) if kind == POLYGON and not held else None
+    made: list[Track] = []
+    if rigid is not None:
+        rows, polygons = rigid
+    if held or (kind == POLYGON and rigid is None):
+        made.append(Track(kind, BEFORE, rows[before], before, polygons))
+        made.append(Track(kind, AFTER, rows[after], after, polygons))
+        if not held:
+            cover_rows, cover = _covers(obstacle)
+            made.append(Track(kind, BEFORE, cover_rows[before], before, cover))
+    else:
+        made.append(Track(kind, MOVING, _interpolated(rows, before, after, substeps), before, polygons))
+    if obstacle.late:
+        late = before - obstacle.late
+        place = np.clip(late, 0, len(rows) - 1)
+        track = rows[place]
+        track[(late < 0) | (late >= len(rows)) | (before != after)] = np.nan
+        made.append(Track(kind, INSTANT, track, place, polygons))
+    return made
+
+
+def shape_rows(obstacle: Obstacle) -> tuple[int, Array, tuple[_Parts, ...]]:
+    """What an obstacle is made of, and its size and place at the steps: kind, rows (T, 5), polygons."""
     if obstacle.rectangles is not None:
-        return RECTANGLE, np.asarray(obstacle.rectangles)
+        return RECTANGLE, np.asarray(obstacle.rectangles), ()
     rows = np.full((obstacle.n_steps + 1, 5), np.nan)
     if obstacle.circles is not None:
         rows[:, :2] = obstacle.circles[:, :2]
         rows[:, 3] = rows[:, 4] = obstacle.circles[:, 2]
         rows[:, 2] = 0.0
-        return CIRCLE, rows
-    for step, polygons in enumerate(obstacle.polygons[: len(rows)]):
-        if polygons:
-            points = np.concatenate(polygons)
-            centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            radius = np.hypot(*(points - centre).T).max()
-            rows[step] = (*centre, 0.0, radius, radius)
-    return POLYGON, rows
+        rows[np.isnan(rows[:, 0]), 2] = np.nan
+        return CIRCLE, rows, ()
+    return POLYGON, *_around(list(obstacle.polygons[: len(rows)]), len(rows))
+
+
+def _around(parts: list[_Parts], count: int) -> tuple[Array, tuple[_Parts, ...]]:
+    """Circumcircles of polygons as rows (T, 5), and the polygons seen from their middles."""
+    rows, local = np.full((count, 5), np.nan), []
+    for step, polygons in enumerate(parts):
+        if not polygons:
+            local.append(())
+            continue
+        points = np.concatenate(polygons)
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        radius = np.hypot(*(points - centre).T).max()
+        rows[step] = (*centre, 0.0, radius, radius)
+        local.append(tuple(polygon - centre for polygon in polygons))
+    return rows, tuple(local)
+
+
+def _as_one_body(obstacle: Obstacle, rows: Array) -> tuple[Array, tuple[_Parts, ...]] | None:
+    """Rows by the states' poses, and the polygons seen from them; None if they do not move as one body."""
+    there = np.flatnonzero(np.isfinite(rows[:, 0]))
+    poses = obstacle.states[: len(rows), :3]
+    if not len(there) or not np.isfinite(poses[there]).all():
+        return None
+    local: list[_Parts] = [()] * len(rows)
+    for step in there.tolist():
+        x, y, heading = poses[step]
+        turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
+        local[step] = tuple((polygon - (x, y)) @ turn for polygon in obstacle.polygons[step])
+    first = local[there[0]]
+    for step in there[1:].tolist():
+        same = len(local[step]) == len(first) and all(
+            a.shape == b.shape and np.abs(a - b).max() <= _RIGID
+            for a, b in zip(local[step], first, strict=True)
+        )
+        if not same:
+            return None
+    made = np.full_like(rows, np.nan)
+    made[there, :3] = poses[there]
+    made[there, 3:] = max(float(np.hypot(*part.T).max()) for step in there.tolist() for part in local[step])
+    return made, tuple(local)
+
+
+def _covers(obstacle: Obstacle) -> tuple[Array, tuple[_Parts, ...]]:
+    """For each step the hull of the polygons then and at the next one."""
+    import shapely
+
+    parts = list(obstacle.polygons[: obstacle.n_steps + 1])
+    hulls: list[_Parts] = []
+    for here, following in zip(parts, [*parts[1:], ()], strict=True):
+        if not here or not following:
+            hulls.append(())
+            continue
+        hull = shapely.convex_hull(shapely.multipoints(np.concatenate([*here, *following])))
+        hulls.append((np.asarray(hull.exterior.coords)[:-1],) if hull.geom_type == "Polygon" else ())
+    return _around(hulls, len(parts))
+
+
+def _interpolated(rows: Array, before: Index, after: Index, substeps: int) -> Array:
+    """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
+    weight = (np.arange(len(before)) % substeps / substeps)[:, None]
+    left, right = rows[before], rows[after]
+    change = right - left
+    change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.where(weight > 0.0, left + weight * change, left)
 
 
 @lru_cache(maxsize=256)
