@@ -68,10 +68,18 @@ def _outline(shape):
     return shape.shapely_object
 
 
+def _placed(shape, x: float, y: float, psi: float):
+    """A shape at a pose as commonroad-io places it: each part of it turned about its own centre."""
+    if hasattr(shape, "shapes"):
+        return shapely.union_all([_placed(part, x, y, psi) for part in shape.shapes])
+    turned = affinity.rotate(_outline(shape), psi, tuple(shape.center), use_radians=True)
+    return affinity.translate(turned, x, y)
+
+
 def _moving(states, shape, first: int, dt: float, t: np.ndarray):
     """Geometry of a rigid obstacle at times t (None where it is not there)."""
     steps = {s.time_step - first: s for s in states}
-    outline, found = _outline(shape), []
+    found = []
     for time in t:
         k = time / dt
         low = int(np.floor(k + 1e-9))
@@ -85,12 +93,12 @@ def _moving(states, shape, first: int, dt: float, t: np.ndarray):
             turn = (there.orientation - psi + np.pi) % (2 * np.pi) - np.pi
             x, y = (1 - share) * np.array([x, y]) + share * np.asarray(there.position)
             psi += share * turn
-        found.append(affinity.translate(affinity.rotate(outline, psi, (0.0, 0.0), use_radians=True), x, y))
+        found.append(_placed(shape, x, y, psi))
     return found
 
 
 def _stated(occupancies, first: int, dt: float, t: np.ndarray):
-    """Geometry of a set-based prediction: at a step what is stated there, between two steps the union of both."""
+    """Geometry of a set-based prediction: what is stated at a step, between two steps the union of both."""
     at: dict[int, list] = {}
     for occupancy in occupancies:
         step = occupancy.time_step
@@ -108,7 +116,7 @@ def _stated(occupancies, first: int, dt: float, t: np.ndarray):
 def contact_time(
     ego: Ego, scenario, first: int, until: float, *, since: float = 0.0, deeper: float = 0.0
 ) -> float:
-    """First time [s] at which the ego meets an obstacle by more than ``deeper`` [m]; inf where it never does."""
+    """First time [s] at which the ego meets an obstacle by more than ``deeper`` [m]; inf if never."""
     keep = (ego.t >= since - 1e-9) & (ego.t <= until + 1e-9)
     t, boxes = ego.t[keep], _boxes(ego.poses[keep], ego.length - 2 * deeper, ego.width - 2 * deeper)
     low, high = ego.poses[keep, :2].min(axis=0) - 10.0, ego.poses[keep, :2].max(axis=0) + 10.0
@@ -118,10 +126,7 @@ def contact_time(
         start = obstacle.initial_state
         if prediction is None:
             x, y = start.position
-            turned = affinity.rotate(
-                _outline(obstacle.obstacle_shape), start.orientation, (0.0, 0.0), use_radians=True
-            )
-            shapes = [affinity.translate(turned, x, y)] * len(t)
+            shapes = [_placed(obstacle.obstacle_shape, x, y, start.orientation)] * len(t)
         elif getattr(prediction, "trajectory", None) is not None:
             states = {s.time_step: s for s in (start, *prediction.trajectory.state_list)}
             centres = np.array([s.position for s in states.values()])
@@ -137,3 +142,15 @@ def contact_time(
         if hits.any():
             best = min(best, float(t[there][np.argmax(hits)]))
     return best
+
+
+def judged(result, file) -> float:
+    """When a trajectory that was called feasible or free of conflict meets an obstacle [s]; inf if never."""
+    from commonroad.common.file_reader import CommonRoadFileReader
+    from vehiclemodels import parameters_vehicle1
+
+    scenario, problems = CommonRoadFileReader(str(file)).open()
+    first = next(iter(problems.planning_problem_dict.values())).initial_state.time_step
+    states = result.trajectory.state_list
+    ego = ego_of(states, scenario.dt, parameters_vehicle1.parameters_vehicle1())
+    return contact_time(ego, scenario, first, (len(states) - 1) * scenario.dt)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,13 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.backend.base import Capabilities, RepairBackend
+from repair.backend.guard import Guarded
 from repair.baselines.evasive.at_ttr import AtTtr
 from repair.check.peaks import Peaks
 from repair.config.load import load_config
-from repair.config.schema import Config
+from repair.config.schema import Config, require_types
 from repair.curves.base import Curve, SplicedCurve
-from repair.errors import RepairError
+from repair.deadline import OutOfTime, until
+from repair.errors import BackendError, ConfigError, OutputError, RepairError, in_words, kind_of, path_of
 from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
+from repair.io.destination import require_folder
 from repair.metrics.base import Asked, MetricValue
 from repair.metrics.registry import measure
 from repair.outcome.build import outcome_of
@@ -28,6 +32,7 @@ from repair.scene.scene import Scene
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
 from repair.solvers.registry import make_backend
+from repair.vehicle.commonroad_ks import load_official
 from repair.vehicle.states import DrivenStates
 
 if TYPE_CHECKING:
@@ -117,11 +122,19 @@ class RepairResult:
 
     def saved(self, folder: str | Path, *, figure: bool = True) -> tuple[Outcome, list[Path]]:
         """Write the result into a folder; its outcome with the names of the files, and their paths."""
+        target = path_of(folder, "the folder of a result", OutputError)
+        require_folder(target)
         made = Saved(self.outcome, self.prepared.scene, self.states, self.status, figure)
-        return saved(made, Path(folder))
+        return saved(made, target)
 
     def save(self, folder: str | Path, *, figure: bool = True) -> list[Path]:
-        """Write ``result.json``, the solution file, the figures and what they show into ``folder``."""
+        """Write ``result.json``, the solution file, the figures and what they show into ``folder``.
+
+        Raises
+        ------
+        OutputError
+            If that is no folder, or cannot be written to.
+        """
         return self.saved(folder, figure=figure)[1]
 
 
@@ -130,6 +143,7 @@ def repair(
     config: Config | None = None,
     *,
     on_probe: Callable[[Probe], None] | None = None,
+    on_found: Callable[[SearchResult], None] | None = None,
     **keys: Any,
 ) -> RepairResult:
     """Find the F-TTR and the repaired trajectory of a scenario.
@@ -142,6 +156,9 @@ def repair(
         See :func:`repair.load_config`; defaults otherwise.
     on_probe : callable, optional
         Called after every probe (anytime use).
+    on_found : callable, optional
+        Called when the search has ended, before anything is made of it: from then on an interrupt is the
+        caller's.
     **keys
         Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
 
@@ -153,12 +170,32 @@ def repair(
     """
     if config is not None and keys:
         raise RepairError("give either a config or configuration keys, not both")
-    config = config or load_config(**keys)
-    backend = make_backend(config.backend, config)
+    if on_probe is not None and not callable(on_probe):
+        raise RepairError(f"on_probe is called with every probe; {kind_of(on_probe)} cannot be called")
+    if config is None:
+        config = load_config(**keys)
+    elif not isinstance(config, Config):
+        raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
+    require_types(config)
+    backend = _made(config)
     phases = Phases()
     with phases("load"):
         scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
-    return search(prepare(scene, config), backend, on_probe=on_probe, phases=phases.seconds)
+    return search(
+        prepare(scene, config), backend, on_probe=on_probe, on_found=on_found, phases=phases.seconds
+    )
+
+
+def _made(config: Config) -> RepairBackend:
+    """The backend that is asked for; whatever its factory raises is an error of the backend."""
+    try:
+        return make_backend(config.backend, config)
+    except RepairError:
+        raise
+    except Exception as error:
+        raise BackendError(
+            f"backend {config.backend!r} cannot be made: {type(error).__name__}: {in_words(error)}"
+        ) from error
 
 
 def search(
@@ -166,21 +203,27 @@ def search(
     backend: RepairBackend,
     *,
     on_probe: Callable[[Probe], None] | None = None,
+    on_found: Callable[[SearchResult], None] | None = None,
     phases: dict[str, float] | None = None,
 ) -> RepairResult:
     """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, the same search at the TTR alone)."""
     timed = Phases(dict(phases or {}))
     timed.seconds.update(prepared.phases)
     asked = Asked(prepared, prepared.config.evasive)
+    if prepared.config.search.time_limit is not None:
+        with timed("imports"):
+            load_official()
     with timed("search"):
         found = find(prepared, backend, asked=asked, on_probe=on_probe)
+    if on_found is not None:
+        on_found(found)
     timed.seconds["solve"] = sum(p.solve.solve_time for p in found.probes)
     timed.seconds["build"] = sum(p.solve.build_time for p in found.probes)
     timed.seconds["check"] = sum(p.check_time for p in found.probes)
     config = prepared.config
     wanted = [
         *config.metrics,
-        *(["ttr"] if config.driver == "at_ttr" and "ttr" not in config.metrics else []),
+        *(["ttr"] if config.driver == "at_ttr" and "ttr" not in config.metrics and asked.evaded else []),
     ]
     metrics: dict[str, MetricValue] = {}
     if wanted:
@@ -209,18 +252,33 @@ def find(
     ----------
     asked : Asked, optional
         Where the TTR is kept that ``driver: at_ttr`` needs.
+
+    Raises
+    ------
+    BackendError
+        If the backend raises, or what it answers is no answer.
     """
     settings = settings or prepared.config.search
+    limit = settings.time_limit
+    if limit is not None:  # once in the life of a process, and no search's fault
+        load_official()
+    backend = Guarded(backend, prepared.config.backend)
     if prepared.config.driver != "at_ttr":
         return search_f_ttr(
             prepared.source, prepared.conflict, backend, prepared.checker, settings, on_probe=on_probe
         )
-    clock = Phases()
-    with clock("ttr"):
-        asked = asked or Asked(prepared, prepared.config.evasive)
-        source = AtTtr(prepared.source, asked.evasive)
-    if settings.time_limit is not None:  # finding the TTR is part of it
-        settings = replace(settings, time_limit=max(settings.time_limit - clock.seconds["ttr"], 0.0))
+    begin = time.perf_counter()
+    try:
+        with until(None if limit is None else begin + limit):
+            asked = asked or Asked(prepared, prepared.config.evasive)
+            source = AtTtr(prepared.source, asked.evasive)
+    except OutOfTime:
+        spent = time.perf_counter() - begin
+        return SearchResult(
+            SearchStatus.BUDGET_EXHAUSTED, prepared.conflict, None, None, complete=False, wall_time=spent
+        )
+    if limit is not None:  # finding the TTR is part of it
+        settings = replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 0.0))
     return search_f_ttr(
         source, prepared.conflict, backend, prepared.checker, settings,
         visits=source.visits, on_probe=on_probe,

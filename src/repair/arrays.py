@@ -11,7 +11,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Array", "Points", "column", "frozen", "largest", "number", "smallest"]
+__all__ = ["Array", "Points", "column", "frozen", "largest", "number", "smallest", "wrap"]
 
 #: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
 Array = npt.NDArray[np.floating[Any]]
@@ -34,6 +34,11 @@ def largest(values: Array) -> float:
 def smallest(values: Array) -> float:
     """Smallest of at least one number; NaN if one of them is."""
     return float(values.item(values.argmin()))
+
+
+def wrap(angle: Any) -> Any:
+    """Angle(s) in [-pi, pi)."""
+    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def number(value: float | None, digits: int = 9) -> float | None:

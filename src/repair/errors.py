@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from typing import Any
+
 __all__ = [
     "BackendError",
     "ConfigError",
@@ -9,6 +13,9 @@ __all__ = [
     "ReferenceTrajectoryError",
     "RepairError",
     "ScenarioError",
+    "in_words",
+    "kind_of",
+    "path_of",
 ]
 
 
@@ -34,3 +41,40 @@ class BackendError(RepairError):
 
 class OutputError(RepairError):
     """A result cannot be written."""
+
+
+def in_words(thing: object, most: int = 200) -> str:
+    """A foreign error, or any value, on one line and not too long; its type where it has no words."""
+    try:
+        text = " ".join((str(thing) if isinstance(thing, BaseException) else repr(thing)).split())
+    except Exception:  # a foreign __repr__
+        text = ""
+    if not text:
+        return type(thing).__name__
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def kind_of(thing: object) -> str:
+    """What something is, for sentences: its type by name."""
+    return "None" if thing is None else f"a {type(thing).__name__}"
+
+
+def path_of(thing: Any, what: str, error: type[RepairError]) -> Path:
+    """A path that a user gave.
+
+    Parameters
+    ----------
+    thing : str or path
+    what : str
+        What it has to name, to begin the sentence with.
+    error : type
+        What is raised where it is none.
+    """
+    if not isinstance(thing, (str, os.PathLike)):
+        raise error(f"{what} has to be a path, not {kind_of(thing)}")
+    name = os.fspath(thing)
+    if not isinstance(name, str):
+        raise error(f"{what} has to be a path as text, not as bytes; os.fsdecode makes text of them")
+    if "\0" in name:
+        raise error(f"{what} is {in_words(name)}; no path holds a null character")
+    return Path(name)

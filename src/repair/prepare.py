@@ -6,25 +6,22 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
-from repair.config.schema import Config
-from repair.errors import ConfigError
+from repair.config.schema import Config, require_types
+from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.problem.limits import resolve_limits
 from repair.reference.recorded import known_until
-from repair.reference.registry import SOURCES, make_reference, positions_along
+from repair.reference.registry import SOURCES, make_reference, positions_along, reference_notes
 from repair.scene.reframe import as_ego, reframe
+from repair.scene.scene import Scene
 from repair.scene.settings import LOADING, SceneConfig
 from repair.situation import Situation
-from repair.timegrid import INSTANT, on_grid
+from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.world.occupancy import build_occupancy, shrink_to_start
-
-if TYPE_CHECKING:
-    from repair.scene.scene import Scene
 
 __all__ = ["Phases", "Prepared", "prepare"]
 
@@ -72,6 +69,11 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     RepairError
         If no reference can be had.
     """
+    if not isinstance(scene, Scene):
+        raise ScenarioError(f"a scene is expected (repair.load_scene), not {kind_of(scene)}")
+    if not isinstance(config, Config):
+        raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
+    require_types(config)
     config = _agreed(scene, config)
     phases = Phases()
     positions = positions_along(scene, config.reference)
@@ -82,20 +84,25 @@ def prepare(scene: Scene, config: Config) -> Prepared:
             scene = as_ego(scene, chosen)
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
-    s_offset = vehicle.half_length + _BODY_MARGIN if s_offset is None else s_offset
-    l_offset = vehicle.half_width + _BODY_MARGIN if l_offset is None else l_offset
+    room = config.checker.clearance + _BODY_MARGIN
+    s_offset = vehicle.half_length + room if s_offset is None else s_offset
+    l_offset = vehicle.half_width + room if l_offset is None else l_offset
     with phases("occupancy"):
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset)
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
     with phases("checker"):
         checker = Checker(scene, limits, config.checker)
         touching = checker.touching_at_start()
-    occupancy, more = shrink_to_start(occupancy, scene.start[0], touching)
+    offsets = s_offset, l_offset
     with phases("reference"):
-        reference = make_reference(scene, config.reference, occupancy)
+        known, _ = shrink_to_start(occupancy, scene.start[0], touching, offsets)
+        reference = make_reference(scene, config.reference, known)
     t_reference = min(scene.horizon, reference.t_end)
+    followed = reference.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
+    occupancy, more = shrink_to_start(occupancy, followed, touching, offsets)
     with phases("conflict"):
         conflict, _ = detect_conflict(reference, occupancy, checker, t_reference)
+    said = reference_notes(scene, reference)
     wanted = config.repair.horizon
     if wanted is None:
         wanted = conflict.time + config.repair.after_conflict
@@ -116,7 +123,7 @@ def prepare(scene: Scene, config: Config) -> Prepared:
         conflict=conflict,
         t_reference=t_reference,
         t_end=float(t_end),
-        notes=(*scene.notes, *notes, *more, *_remarks(config, wanted, t_reference)),
+        notes=(*scene.notes, *said, *notes, *more, *_remarks(config, wanted, t_reference)),
         config=config,
         phases=phases.seconds,
     )

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from math import isfinite
+from numbers import Integral, Real
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from repair.errors import ConfigError
+from repair.errors import ConfigError, in_words
 
-__all__ = ["Key", "Setting", "keys_of", "require_sane", "setting"]
+__all__ = ["Key", "Setting", "keys_of", "require_sane", "require_type", "setting"]
 
 _ELEMENT = 50.0  # a list of numbers holds none of larger size: margins [m]
 
@@ -107,6 +108,28 @@ def _type_name(hint: Any) -> str:
     return (
         hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint).replace("typing.", "")
     )
+
+
+_TYPES: dict[str, tuple[type, ...]] = {
+    "null": (type(None),), "bool": (bool,), "int": (Integral,), "float": (Real,), "str": (str,),
+    "list": (list,), "dict": (dict,),
+}  # fmt: skip
+
+
+def require_type(key: Key, value: Any) -> None:
+    """Refuse a value of another type than the key's: for settings that no schema has seen.
+
+    Raises
+    ------
+    ConfigError
+        Naming the key, what it got and what it expects.
+    """
+    words = [word.partition("[")[0] for word in key.type.split(" or ")]
+    if any(word not in _TYPES for word in words):
+        return  # of a backend from elsewhere
+    known = tuple(one for word in words for one in _TYPES[word])
+    if not isinstance(value, known) or (isinstance(value, bool) and bool not in known):
+        raise ConfigError(f"configuration key {key.name!r} is {in_words(value)}; it must be {key.type}")
 
 
 def require_sane(key: Key, value: Any, words: Sequence[str] | None) -> None:

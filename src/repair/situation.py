@@ -59,6 +59,5 @@ class Situation:
     @cached_property
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
-        return ProblemFactory(
-            self.scene, self.settings, self.limits, self.occupancy, self.reference, self.t_end
-        )
+        limits = self.limits.reserving(self.settings.reserve)
+        return ProblemFactory(self.scene, self.settings, limits, self.occupancy, self.reference, self.t_end)

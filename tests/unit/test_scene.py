@@ -12,7 +12,6 @@ import pytest
 
 from repair.errors import ConfigError, RepairError, ScenarioError
 from repair.scene.commonroad import load_scene, scene_from_scenario
-from repair.scene.lead_in import largest_curvature
 from repair.scene.reading import read_file
 from repair.scene.scene import Scene
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
@@ -201,7 +200,7 @@ def test_start_across_the_lane_gives_a_drivable_path(degrees: float) -> None:
     s0 = made.start[0, 0]
     np.testing.assert_allclose(made.frame.position(s0), [30.0, 0.3], atol=1e-3)
     assert float(made.frame.heading(s0)) == pytest.approx(np.deg2rad(degrees), abs=0.1)
-    assert np.max(np.abs(made.frame.curvature_table)) < largest_curvature(load_vehicle(1))
+    assert np.max(np.abs(made.frame.curvature_table)) < load_vehicle(1).largest_curvature()
     assert made.frame.position(made.frame.length)[1] == pytest.approx(0.0, abs=0.05)
 
 

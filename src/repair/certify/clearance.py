@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["allowed_depth", "clearance_rows"]
 
 
-def allowed_depth(content: dict[str, Any], prepared: Prepared) -> float:
+def allowed_depth(content: Mapping[str, Any], prepared: Prepared) -> float:
     """How far into the inflated boxes the repair may go [m, negative]: a hard backend says itself.
 
     Boxes in (s, l) are wider than the vehicles in them; a soft backend may enter them as far as the

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from repair.arrays import Array
 from repair.certify.certificate import CertificateRow, at_least, at_most
 from repair.curves.base import Curve
 from repair.curves.bspline import UniformBSpline
-from repair.curves.codec import read_curve
 from repair.problem.limits import Limits
 
 if TYPE_CHECKING:
@@ -20,15 +19,9 @@ if TYPE_CHECKING:
 __all__ = ["cut_pieces", "derivative_rows", "pieces_of", "seam_rows"]
 
 
-def seam_rows(content: Mapping[str, Any], curve: Curve, t_rep: float) -> list[CertificateRow]:
+def seam_rows(reference: Curve, curve: Curve, t_rep: float) -> list[CertificateRow]:
     """Jumps in position, velocity and acceleration where the repair leaves the reference."""
-    reference = content.get("reference") or {}
-    if reference.get("type") == "samples":
-        return []
-    before, after = read_curve(reference), curve.sample([t_rep])
-    if before is None:
-        return []
-    here = before.sample([t_rep])
+    here, after = reference.sample([t_rep]), curve.sample([t_rep])
     rows = []
     for name, unit in (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²")):
         jump = float(np.max(np.abs(getattr(here, name) - getattr(after, name))))
@@ -57,8 +50,14 @@ def cut_pieces(points: Array, start: Array, end: Array) -> Array:
     return left
 
 
-def derivative_rows(curve: UniformBSpline | BernsteinCurve, limits: Limits) -> list[CertificateRow]:
-    """Hulls of the first three derivatives, each piece cut into 16 so that the hull is tight."""
+def derivative_rows(
+    curve: UniformBSpline | BernsteinCurve, limits: Limits, *, keeps_hull: bool
+) -> list[CertificateRow]:
+    """Hulls of the first three derivatives, each piece cut into 16 so that the hull is tight.
+
+    Lateral speed, jerk and the accelerations along the axes are claimed of backends that keep hulls, and told
+    of the others: what the vehicle may do is judged in the plane.
+    """
     points, duration = pieces_of(curve)
     cuts = 16
     u = np.tile(np.arange(cuts) / cuts, len(points))
@@ -69,9 +68,11 @@ def derivative_rows(curve: UniformBSpline | BernsteinCurve, limits: Limits) -> l
         fine = (degree - order + 1) / step * np.diff(fine, axis=1)
         hull.append((fine.min(axis=(0, 1)), fine.max(axis=(0, 1))))
     (v_low, v_high), (a_low, a_high), (j_low, j_high) = hull
-    return [
+    rows = [
         at_least("speed s', least", float(v_low[0]), 0.0, "exact", "m/s"),
         at_most("speed s', largest", float(v_high[0]), limits.v_max, "exact", "m/s"),
+    ]
+    hulls = [
         at_most("lateral speed |l'|", _abs(v_low[1], v_high[1]), limits.v_lat, "exact", "m/s"),
         at_least("acceleration s'', least", float(a_low[0]), limits.a_min, "exact", "m/s²"),
         at_most("acceleration s'', largest", float(a_high[0]), limits.a_max, "exact", "m/s²"),
@@ -79,6 +80,7 @@ def derivative_rows(curve: UniformBSpline | BernsteinCurve, limits: Limits) -> l
         at_most("jerk |s'''|", _abs(j_low[0], j_high[0]), limits.j_lon, "exact", "m/s³", 1e-4),
         at_most("jerk |l'''|", _abs(j_low[1], j_high[1]), limits.j_lat, "exact", "m/s³", 1e-4),
     ]
+    return rows + [replace(row, claim=keeps_hull) for row in hulls]
 
 
 def _abs(low: float, high: float) -> float:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.arrays import Array, Points, frozen
-from repair.check.limits import exceeded
+from repair.arrays import Array, Points, frozen, wrap
+from repair.check.limits import Excess, curve_excess, plane_excess, surely_kept
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven
 from repair.check.settings import CheckerConfig
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
 __all__ = ["Checker"]
+
+_STANDS = 1e-6  # below this speed [m/s] a path says nothing about the body's direction
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,13 @@ class Checker:
     def __init__(self, scene: Scene, limits: Limits, config: CheckerConfig) -> None:
         self.scene, self.limits, self.config = scene, limits, config
         self.world = CollisionWorld(scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps)
-        self.road = RoadBoundary(scene.scenario, scene.vehicle) if config.road else None
+        self.road = RoadBoundary(scene.scenario, scene.vehicle, config.road_gap) if config.road else None
         self._corridor = RoadCorridor(self.road, scene.frame, scene.vehicle) if self.road else None
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: _Followed | None = None
         self._checks = [CHECKS[name] for name in config.extra]
+        self._beside = self._met_at_start(config.clearance) if config.clearance else frozenset()
 
     def times(self, t_end: float) -> Array:
         """Dense sample times over [0, t_end]: ``substeps`` to a scenario step, whole steps only."""
@@ -77,7 +80,8 @@ class Checker:
 
     def drive(self, curve: Curve, t_end: float) -> DrivenStates:
         """Consistent vehicle states along the curve, densely sampled."""
-        return self.scene.model.drive(self.path(curve, t_end))
+        path = self.path(curve, t_end)
+        return self.scene.model.drive(path, self._standing(path))
 
     def peaks(self, curve: Curve, t_end: float, t_from: float = 0.0) -> Peaks:
         """Extremes over [t_from, t_end]."""
@@ -91,10 +95,12 @@ class Checker:
 
     def touching_at_start(self) -> set[int]:
         """Obstacles that the ego's rectangle touches at t = 0."""
+        return {self.scene.obstacles[k].id for k in self._met_at_start(0.0)}
+
+    def _met_at_start(self, margin: float) -> frozenset[int]:
+        """Obstacles (by index) that the ego, enlarged by a margin, meets at t = 0."""
         start = self.scene.initial_state
-        pose = (np.array([start.x]), np.array([start.y]), np.array([start.orientation]))
-        contact = self.world.contact(*pose)
-        return set() if contact is None else {contact.obstacle_id}
+        return self.world.met_at(0, complex(start.x, start.y), start.orientation, margin)
 
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
         """Verdict on ``curve`` after the reference until ``problem.t_rep``.
@@ -108,20 +114,22 @@ class Checker:
         if not _finite(path):
             return _NOT_FINITE
         slip, orientation = self.scene.model.angles(path, slip0)
-        found = self._limits(path, len(path.t) - len(after), problem.t_rep)
+        found = self._limits(curve, after, problem, path)
         if self.config.margin:
             found += self._margin(problem, curve, after)
-        found += self._clear(path, s, orientation, first)
+        found += self._clear(path, s, orientation, first, problem.t_rep)
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
-        """Verdict on a reference trajectory: everything but the limits, which are the repair's."""
+        """Verdict on a reference trajectory: by the same measure as a repair's, jerks apart."""
         path, s, slip, orientation = self._follow(reference, t_end)
         if not _finite(path):
             return _NOT_FINITE
-        found = self._clear(path, s, orientation, 0)
+        found = self._clear(path, s, orientation, 0, 0.0)
+        if self.config.limits:
+            found += self._reference_limits(reference, t_end)
         until = min((violation.time for violation in found), default=float("inf"))
         return Verdict(tuple(found + self._kinematics(path, slip, orientation, until)))
 
@@ -130,7 +138,7 @@ class Checker:
         times = self.times(t_end)
         motion = _motion(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
-        slip, orientation = self.scene.model.angles(path)
+        slip, orientation = self.scene.model.angles(path, self._standing(path))
         self._followed = _Followed(reference, t_end, motion, slip)
         return path, motion[0], slip, orientation
 
@@ -156,21 +164,57 @@ class Checker:
             kept = self._kept(problem.reference, problem.t_end)
             motion[:, : late - first] = kept.motion[:, first:late]
             slip0 = None if first == 0 else float(kept.slip[first])
-        return self.scene.frame.carry(times[first:], motion), motion[0], slip0
+        path = self.scene.frame.carry(times[first:], motion)
+        return path, motion[0], self._standing(path) if first == 0 else slip0
 
-    def _clear(self, path: CartesianPath, s: Array, orientation: Array, first_sample: int) -> list[Violation]:
-        """First contact with an obstacle and first departure from the road."""
+    def _standing(self, path: CartesianPath) -> float | None:
+        """Slip angle of a vehicle that stands at t = 0, by its orientation; None if it moves."""
+        if len(path.speed) and abs(float(path.speed[0])) < _STANDS:
+            return float(wrap(path.heading[0] - self.scene.initial_state.orientation))
+        return None
+
+    def _clear(
+        self, path: CartesianPath, s: Array, orientation: Array, first_sample: int, t_from: float
+    ) -> list[Violation]:
+        """First contact with an obstacle, or its margin entered, and first departure from the road."""
         found = []
         centre = path.xy.view(np.complex128)[:, 0]
-        contact = self.world.contact_along(centre, orientation, first_sample, path.longest)
-        if contact is not None:
-            behind = " from behind" if contact.from_behind else ""
-            detail = f"obstacle {contact.obstacle_id}{behind}"
-            found.append(Violation(Reason.COLLISION, contact.time, detail))
+        obstacle = self._met(centre, orientation, first_sample, path.longest, t_from)
+        if obstacle is not None:
+            found.append(obstacle)
         index = self._off_road(s, centre, orientation)
         if index is not None:
-            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), "the ego leaves the road"))
+            assert self.road is not None
+            at = centre[index]
+            where = self.road.departure(at.real, at.imag, float(orientation[index]))
+            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), where))
         return found
+
+    def _met(
+        self, centre: Points, orientation: Array, first: int, step: float, t_from: float
+    ) -> Violation | None:
+        """The first obstacle that is touched, or whose margin is entered from ``t_from`` on.
+
+        A margin that the ego starts in counts once it has been left.
+        """
+        margin = self.config.clearance
+        since = max(round(t_from / self.scene.dt * self.config.substeps) - first, 0)
+        near = self.world.contact_along(
+            centre, orientation, first, step, margin=margin, beside=self._beside, since=since
+        )
+        # Who never enters a margin touches nothing, but for the margins that do not count.
+        unsure = near is not None or bool(self._beside) or since > 0
+        contact = self.world.contact_along(centre, orientation, first, step) if margin and unsure else near
+        if contact is not None and (near is None or contact.time <= near.time):
+            behind = " from behind" if contact.from_behind else ""
+            detail = f"obstacle {contact.obstacle_id}{behind}"
+            return Violation(Reason.COLLISION, contact.time, detail, contact.obstacle_id)
+        if near is None:
+            return None
+        detail = f"obstacle {near.obstacle_id} within {margin:g} m"
+        if contact is not None:
+            detail += f", contact with obstacle {contact.obstacle_id} at {contact.time:.2f} s"
+        return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id)
 
     def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
         """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
@@ -220,10 +264,34 @@ class Checker:
         inside &= l < upper[..., 1]
         return bool(np.count_nonzero(inside))
 
-    def _limits(self, path: CartesianPath, late: int, t_rep: float) -> list[Violation]:
-        """Limits that are broken from the path's sample ``late`` on."""
-        broken = exceeded(path, late, self.limits) if self.config.limits else []
-        return [Violation(Reason.LIMITS, t_rep, "; ".join(broken))] if broken else []
+    def _limits(
+        self, curve: Curve, after: FrenetTrajectory, problem: RepairProblem, path: CartesianPath
+    ) -> list[Violation]:
+        """Limits that the repaired part breaks."""
+        if not self.config.limits:
+            return []
+        slack = self.config.tolerance
+        broken = curve_excess(curve, problem.t_rep, problem.t_end, self.limits, slack)
+        if not surely_kept(path, len(path.t) - len(after), self.limits, self.scene.vehicle):
+            broken += plane_excess(curve, after, self.scene.frame, self.limits, self.scene.vehicle, slack)
+        if not broken:
+            return []
+        words = "; ".join(dict.fromkeys(excess.words for excess in broken))
+        return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
+
+    def _reference_limits(self, reference: Curve, t_end: float) -> list[Violation]:
+        """Limits of speed and acceleration that the reference breaks; its jerk is nobody's claim."""
+        samples, limits, slack = reference.sample(self.times(t_end)), self.limits, self.config.tolerance
+        broken = plane_excess(reference, samples, self.scene.frame, limits, self.scene.vehicle, slack)
+        speed = np.abs(samples.velocity[:, 0])
+        if len(speed) and not float(speed.max()) <= limits.v_max * (1.0 + slack) + 1e-6:
+            fast = int(np.argmax(speed > limits.v_max * (1.0 + slack)))
+            words = f"speed {float(speed.max()):.2f} m/s of {limits.v_max:.2f}"
+            broken.append(Excess(float(samples.t[fast]), words))
+        if not broken:
+            return []
+        words = "; ".join(dict.fromkeys(excess.words for excess in broken))
+        return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
 
     def _kinematics(
         self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")

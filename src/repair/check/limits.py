@@ -1,63 +1,168 @@
-"""Whether a driven path keeps the limits: by its peaks, and by bounds of them that cost less."""
+"""Whether a trajectory keeps the limits, to the letter.
+
+Speed and reversing are bounded at all times by the hull of the Bernstein points of the curve's derivative.
+The accelerations along and across the driven path, and the friction circle, are nonlinear; they are taken
+from the curve's own derivatives and sampled, every millisecond wherever the samples of the check leave it
+open whether a limit is kept between them. Lateral speed and jerk are no limits of the vehicle's: they bind
+the backends, and are nobody's claim unless a backend keeps hulls.
+"""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from repair.arrays import largest, smallest
-from repair.check.peaks import peaks
+import numpy as np
+
+from repair.arrays import Array, largest, smallest
+from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import CartesianPath
 from repair.problem.limits import Limits
+from repair.scene.frame import FrenetFrame
 
-__all__ = ["exceeded", "exceeded_by_peaks", "surely_kept"]
+if TYPE_CHECKING:
+    from repair.vehicle.parameters import Vehicle
 
-# Speeds this far below zero [m/s] still count as standing, and limits are met up to this share:
-# a soft backend ends near its limits, not on them.
-STANDSTILL = 0.05
-SLACK = 0.01
+__all__ = ["ROUNDING", "Excess", "curve_excess", "plane_accelerations", "plane_excess", "surely_kept"]
 
-
-def exceeded(path: CartesianPath, late: int, limits: Limits) -> list[str]:
-    """Limits that are broken from the path's sample ``late`` on, in words; none where all are kept."""
-    return [] if surely_kept(path, late, limits) else exceeded_by_peaks(path, late, limits)
+#: By how much rounding may move a number that is on its limit; the certificate reads curves to 1e-12.
+ROUNDING = 1e-6
+_FINE = 1e-3  # [s]
+_STANDS = 0.1  # below this speed [m/s] a path has no direction along which to accelerate
 
 
-def surely_kept(path: CartesianPath, late: int, limits: Limits) -> bool:
-    """Whether bounds of the peaks, which cost less than the peaks, meet the limits already.
+class Excess(NamedTuple):
+    """A limit that is broken: when [s], and by what, in words."""
 
-    No difference quotient is beyond the largest change of one sample to the next.
+    time: float
+    words: str
+
+
+def surely_kept(path: CartesianPath, late: int, limits: Limits, vehicle: Vehicle) -> bool:
+    """Whether a driven path is so far inside of the limits from a sample on that nothing between is outside.
+
+    The difference quotients stand in for the accelerations. Between samples, an acceleration is taken to be
+    off the quotients around it by less than the largest step from one quotient to the next; the lateral
+    one is bounded by the highest speed and the sharpest turn of all.
     """
     since = max(late - 1, 0)
-    if len(path.t) - since < 2:
+    if len(path.t) - since < 3:
         return False
     speed = path.speed[since:]
     change = speed[1:] - speed[:-1]
     rate = 1.0 / float(path.t[1] - path.t[0])
-    v_high = largest(speed)
-    a_low, a_high = smallest(change), largest(change)
-    lateral = max(-path.slowest, v_high) * path.sharpest
+    v_high, swing = largest(speed), change[1:] - change[:-1]
+    swing_most = max(-smallest(swing), largest(swing))
+    a_low, a_high = (smallest(change) - swing_most) * rate, (largest(change) + swing_most) * rate
+    lateral = 1.25 * max(-path.slowest, v_high) * path.sharpest * rate
     return (
-        path.slowest >= -STANDSTILL
+        path.slowest >= 0.0
         and v_high <= limits.v_max
-        and a_low * rate >= limits.a_min
-        and a_high * rate <= limits.a_max
-        and lateral * rate <= limits.a_lat
-        and math.hypot(max(-a_low, a_high), lateral) * rate <= limits.a_total
+        and a_low >= limits.a_min
+        and a_high <= min(limits.a_max, float(vehicle.engine_acceleration(v_high)))
+        and lateral <= limits.a_lat
+        and math.hypot(max(-a_low, a_high), lateral) <= limits.a_total
     )
 
 
-def exceeded_by_peaks(path: CartesianPath, late: int, limits: Limits) -> list[str]:
-    """The same as :func:`exceeded`, by the peaks themselves."""
-    reached, more = peaks(path, slice(late, None)), 1 + SLACK
-    v_low, v_high = reached.min_speed, reached.max_speed
-    a_low, a_high = reached.min_acceleration, reached.max_acceleration
-    lateral, total = reached.max_lateral_acceleration, reached.max_total_acceleration
-    checks = (
-        (v_low < -STANDSTILL, "reverses at {:.2f} m/s", -v_low),
-        (v_high > limits.v_max * more + 0.1, "speed {:.1f} m/s", v_high),
-        (a_low < limits.a_min * more, "brakes at {:.2f} m/s²", a_low),
-        (a_high > limits.a_max * more, "accelerates at {:.2f}", a_high),
-        (lateral > limits.a_lat * more, "lateral acceleration {:.2f} m/s²", lateral),
-        (total > limits.a_total * more, "total acceleration {:.2f} m/s²", total),
+def curve_excess(curve: Curve, t_from: float, t_end: float, limits: Limits, tolerance: float) -> list[Excess]:
+    """Reversing, and speeds beyond the limit, over [t_from, t_end].
+
+    Parameters
+    ----------
+    tolerance : float
+        Share of the limit by which it may be exceeded.
+    """
+    most = limits.v_max * (1.0 + tolerance)
+    found: list[Excess] = []
+    for cuts in (1, 16):  # the coarse hull mostly suffices
+        times, low, high = _speeds(curve, t_from, t_end, cuts)
+        found = []
+        if not float(low.min(initial=0.0)) >= -ROUNDING:
+            found.append(Excess(float(times[np.argmin(low)]), f"reverses at {-float(low.min()):.2f} m/s"))
+        if not float(high.max(initial=0.0)) <= most + ROUNDING:
+            words = f"speed {float(high.max()):.2f} m/s of {most:.2f}"
+            found.append(Excess(float(times[np.argmax(high > most + ROUNDING)]), words))
+        if not found:
+            break
+    return found
+
+
+@lru_cache(maxsize=64)
+def _is_hulled(kind: type) -> bool:
+    """Whether curves of a type are :class:`repair.curves.base.Hulled`; to ask a protocol takes long."""
+    return hasattr(kind, "speed_hulls")
+
+
+def _speeds(curve: Curve, t_from: float, t_end: float, cuts: int) -> tuple[Array, Array, Array]:
+    """Times (M,) at which parts begin, and bounds (M,) of s' over them."""
+    hulled: Any = curve
+    if _is_hulled(type(curve)):
+        times, low, high = hulled.speed_hulls(cuts)
+        keep = times < t_end - ROUNDING
+        return times[keep], low[keep], high[keep]
+    times = np.linspace(t_from, t_end, max(2, round((t_end - t_from) / _FINE) + 1))
+    speed = curve.sample(times).velocity[:, 0]
+    return times, speed, speed
+
+
+def plane_accelerations(frame: FrenetFrame, samples: FrenetTrajectory) -> tuple[Array, Array]:
+    """Acceleration of the centre along and across its own path (K,) [m/s²], from the curve's derivatives.
+
+    With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the acceleration
+    (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2).
+    """
+    (s, l), (v, w), (a, b) = samples.position.T, samples.velocity.T, samples.acceleration.T  # noqa: E741
+    kappa = frame.curvature(s)
+    if not np.count_nonzero(l) and not np.count_nonzero(w):
+        return a, kappa * v * v
+    scale = 1.0 - kappa * l
+    forward = scale * v
+    along = scale * a - 2.0 * kappa * v * w - frame.curvature_rate(s) * l * v * v
+    across = b + forward * kappa * v
+    speed = np.hypot(forward, w)
+    moving = speed > _STANDS
+    cos = np.where(moving, forward / np.where(moving, speed, 1.0), 1.0)
+    sin = np.where(moving, w / np.where(moving, speed, 1.0), 0.0)
+    return cos * along + sin * across, cos * across - sin * along
+
+
+def plane_excess(
+    curve: Curve,
+    samples: FrenetTrajectory,
+    frame: FrenetFrame,
+    limits: Limits,
+    vehicle: Vehicle,
+    tolerance: float,
+) -> list[Excess]:
+    """What breaks a limit in the plane: along and across the driven path, friction circle, engine.
+
+    Parameters
+    ----------
+    samples : FrenetTrajectory
+        Of the curve, equally spaced, over what is judged.
+    """
+    if not len(samples):
+        return []
+    times = samples.t
+    if len(times) > 1:
+        count = max(1, round(float(times[1] - times[0]) / _FINE))
+        samples = curve.sample(np.linspace(times[0], times[-1], (len(times) - 1) * count + 1))
+        times = samples.t
+    along, across = plane_accelerations(frame, samples)
+    (s, l), (v, w) = samples.position.T, samples.velocity.T  # noqa: E741
+    engine = vehicle.engine_acceleration(np.hypot((1.0 - frame.curvature(s) * l) * v, w))
+    more, c = 1.0 + tolerance, limits
+    rows = (
+        (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}"),
+        (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}"),
+        (along / engine, 1.0, "needs {:.2f} of what the engine gives at that speed, {:.2f}"),
+        (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}"),
+        (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}"),
     )
-    return [text.format(value) for bad, text, value in checks if bad]
+    return [
+        Excess(float(times[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
+        for value, most, text in rows
+        if not float(value.max()) <= most + ROUNDING
+    ]

@@ -20,8 +20,21 @@ class CheckerConfig:
         choices=("leftover", "always", "never"),
     )
     road: bool = setting(True, "the ego's rectangle stays on the road")
+    road_gap: float = setting(
+        0.4, "gaps and holes of the map up to this width are road [m]", low=0.0, high=2.0
+    )
     limits: bool = setting(True, "the repaired part keeps the limits")
     margin: bool = setting(False, "the repaired part keeps out of the inflated boxes, as the TTC has it")
+    conflict: str = setting(
+        "shapes",
+        "by what a conflict of the reference is found: true shapes with checker.clearance, as repairs are "
+        "judged, or the inflated boxes (the paper)",
+        choices=("shapes", "boxes"),
+    )
+    clearance: float = setting(
+        0.1, "safety margin around the ego's rectangle, for conflict and repair alike [m]", low=0.0, high=5.0
+    )
+    tolerance: float = setting(0.0, "share of every limit by which a repair may exceed it", low=0.0, high=0.1)
     extra: list[str] = setting(
         factory=list, says="registered checks that a repair has to pass too", registry="check"
     )

@@ -25,11 +25,12 @@ class Reason(str, Enum):
 
 @dataclass(frozen=True)
 class Violation:
-    """One reason, when it first holds [s], and the particulars in words."""
+    """One reason, when it first holds [s], the particulars in words, and the obstacle if it is one."""
 
     reason: Reason
     time: float
     detail: str = ""
+    obstacle_id: int | None = None
 
 
 @dataclass(frozen=True)
@@ -63,14 +64,16 @@ class Conflict:
     time : float
         TTC [s]: first scenario step at which the reference violates something; inf if never.
     kind : str
-        ``margin`` (inflated occupancy entered), ``collision``, ``off_road``, ``kinematics`` or
-        ``none``.
+        ``margin`` (a safety margin is entered), ``collision``, ``off_road``, ``limits``, ``kinematics``
+        or ``none``.
     obstacle_id : int or None
     contact_time : float
         First contact of the true rectangles [s], inf if never.
     contact_id : int or None
     from_behind : bool
         The obstacle strikes the ego from behind.
+    detail : str
+        What is violated, in words: where the road is left and by how much, which limit is exceeded.
     """
 
     time: float
@@ -79,3 +82,4 @@ class Conflict:
     contact_time: float = float("inf")
     contact_id: int | None = None
     from_behind: bool = False
+    detail: str = ""

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from repair.errors import RepairError
+from repair.errors import RepairError, in_words
 
 if TYPE_CHECKING:
     from repair.config import Config
@@ -48,20 +48,33 @@ def resolve(arguments: argparse.Namespace) -> Config:
     """The configuration that these arguments make."""
     from repair.config import load_config
 
-    overrides = [*_reference_overrides(arguments.reference), *arguments.overrides]
-    return load_config(arguments.preset, arguments.config, overrides, backend=arguments.backend)
+    given = _reference(arguments.reference)
+    plain = all(value.isprintable() for value in given.values())
+    texts = [f"reference.{key}={_quoted(value)}" for key, value in given.items()] if plain else []
+    return load_config(
+        arguments.preset, arguments.config, [*texts, *arguments.overrides],
+        backend=arguments.backend, reference=None if plain else given,
+    )  # fmt: skip
 
 
-def _reference_overrides(reference: str | None) -> list[str]:
+def _reference(reference: str | None) -> dict[str, str]:
+    """The keys of the section ``reference`` that ``--reference`` stands for."""
     if reference is None:
-        return []
+        return {}
     if reference in (known := reference_names()):
-        return [f"reference.source={reference}"]
-    if not Path(reference).is_file():
-        raise UsageError(f"reference {reference!r} is neither one of {', '.join(known)} nor a file")
-    # Quoted: a path may hold what YAML takes for something else.
-    quoted = Path(reference).resolve().as_posix().replace("'", "''")
-    return ["reference.source=file", f"reference.file='{quoted}'"]
+        return {"source": reference}
+    try:
+        there = Path(reference).is_file()
+    except OSError:  # a name that is too long
+        there = False
+    if not there:
+        raise UsageError(f"reference {in_words(reference)} is neither one of {', '.join(known)} nor a file")
+    return {"source": "file", "file": Path(reference).resolve().as_posix()}
+
+
+def _quoted(text: str) -> str:
+    """A text as YAML: a path may hold what that takes for something else."""
+    return "'" + text.replace("'", "''") + "'"
 
 
 def no_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,11 +11,12 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from repair.cli import certify, info, paper, run, sweep
 from repair.cli.arguments import UsageError, no_arguments
-from repair.errors import RepairError
+from repair.cli.streams import lenient, opened
+from repair.errors import RepairError, in_words
 
 __all__ = ["entry", "main"]
 
@@ -25,6 +26,15 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message} (see `{self.prog} --help`)")
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """What is left over is an error of the verb it was given to: its help has the options."""
+        found, left = self.parse_known_args(args, namespace)
+        if left:
+            verb = getattr(found, "verb", None)
+            help_of = f"{self.prog} {verb}" if verb else self.prog
+            raise UsageError(f"unrecognized arguments: {' '.join(left)} (see `{help_of} --help`)")
+        return found
 
 
 @dataclass(frozen=True)
@@ -71,30 +81,51 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status. Errors of the user's input end as one sentence on stderr."""
-    try:
-        parser = _parser()
-        arguments = parser.parse_args(argv)
-        if arguments.version:
-            import repair
+    with lenient():
+        try:
+            return _run(_parser(), argv)
+        except RepairError as error:
+            print(f"repair: {' '.join(str(error).split())}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("repair: interrupted before anything was found", file=sys.stderr)
+            return 130
+        except BrokenPipeError:
+            # The reader of our output left; what it wanted, it has. Python must not complain when it flushes.
+            _abandon_stdout()
+            return 0
+        except OSError as error:
+            if error.filename is not None:  # what is printed has no name, and what is saved is an OutputError
+                raise
+            _abandon_stdout()
+            why = error.strerror or in_words(error)
+            print(f"repair: standard output cannot be written: {why}", file=sys.stderr)
+            return 2
 
-            print(f"commonroad-repair {repair.__version__}")
-            return 0
-        if arguments.verb is None:
-            parser.print_help()
-            return 0
-        status: int = arguments.run(arguments)
-        sys.stdout.flush()
-        return status
-    except RepairError as error:
-        print(f"repair: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("repair: interrupted before anything was found", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # The reader of our output left; what it wanted, it has. Python must not complain when it flushes.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+def _run(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
+    arguments = parser.parse_args(argv)
+    if arguments.version:
+        import repair
+
+        print(f"commonroad-repair {repair.__version__}")
         return 0
+    if arguments.verb is None:
+        parser.print_help()
+        return 0
+    try:
+        status: int = arguments.run(arguments)
+    except UsageError as error:
+        text = str(error)
+        text += "" if "--help" in text else f" (see `repair {arguments.verb} --help`)"
+        raise UsageError(text) from None
+    sys.stdout.flush()
+    return status
+
+
+def _abandon_stdout() -> None:
+    """Let go of what standard output has not taken: it would be an error again when the interpreter ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def entry() -> NoReturn:
@@ -102,6 +133,7 @@ def entry() -> NoReturn:
     import logging
     import warnings
 
+    opened()
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # more threads slow small dense algebra down
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if not sys.warnoptions:
@@ -112,7 +144,7 @@ def entry() -> NoReturn:
     except Exception as error:
         if os.environ.get("REPAIR_DEBUG"):
             raise
-        first = (str(error).splitlines() or [""])[0]
+        first = (str(error).splitlines() or [""])[0].encode("utf-8", "backslashreplace").decode()
         print(
             f"repair: internal error ({type(error).__name__}: {first}); this is a defect of the program, "
             "please report it; REPAIR_DEBUG=1 shows where it happened",

@@ -70,9 +70,11 @@ def figures_arguments(parser: argparse.ArgumentParser) -> None:
 
 def figures(arguments: argparse.Namespace) -> int:
     """The paper's Figures 4, 5 and 6."""
+    from repair.io.destination import require_folder
     from repair.io.files import write_files
     from repair.paper.figures import paper_figures
 
+    require_folder(arguments.out)
     for path in write_files(arguments.out, paper_figures(arguments.backend, arguments.format)):
         print(path)
     return 0

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.cli.arguments import configuration_arguments, resolve
+from repair.cli.streams import as_json
 from repair.errors import RepairError
 from repair.paper.bundled import OFFICIAL_FILES, PAPER_SCENARIOS, find_scenario, paper_scenario
 
@@ -48,14 +49,26 @@ def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
 
 
 class _Interrupts:
-    """Remembers that Ctrl-C was pressed: the search swallows it and returns what it has."""
+    """Remembers that Ctrl-C was pressed: the search swallows it and returns what it has.
+
+    What was found is printed and written whatever comes: after the search Ctrl-C is only remembered. A
+    second one while figures are drawn and files are written ends that, not the printing.
+    """
 
     def __init__(self) -> None:
         self.seen = False
+        self.ignored = 0.0  # how many more are only remembered
+
+    def found(self, _: object = None) -> None:
+        """The search has ended: there is something to lose from now on."""
+        self.ignored = float("inf")
 
     def __enter__(self) -> _Interrupts:
         def handler(number: int, frame: Any) -> None:
             self.seen = True
+            if self.ignored:
+                self.ignored -= 1.0
+                return
             raise KeyboardInterrupt
 
         try:
@@ -71,22 +84,30 @@ class _Interrupts:
 
 def run(arguments: argparse.Namespace) -> int:
     """One scenario; the result on stdout, and in files where a folder is given."""
+    if arguments.out is not None:
+        from repair.io.destination import require_folder
+
+        require_folder(arguments.out)
     with _Interrupts() as interrupts, _scenario(arguments) as (path, config):
         from repair.api import repair
         from repair.io.result_json import to_json
         from repair.report.text import summary
 
-        result = repair(path, config)
+        result = repair(path, config, on_found=interrupts.found)
         content, problem = result.to_dict(), None
         written: list[Path] = []
         if arguments.out is not None:
+            interrupts.ignored = 1.0
             try:
                 outcome, written = result.saved(arguments.out, figure=not arguments.no_figure)
                 content = outcome.record
             except RepairError as error:
                 problem = error
+            except KeyboardInterrupt:  # the second one
+                pass
+            interrupts.found()
         if arguments.json:
-            sys.stdout.write(to_json(content))
+            sys.stdout.write(as_json(to_json(content)))
         else:
             print(summary(content, arguments.preset, written))
         if problem is not None:

@@ -39,10 +39,15 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
 
 def sweep(arguments: argparse.Namespace) -> int:
     """Every file, backend and reference; prints the rows as CSV where no folder is given."""
+    from repair.io.destination import require_folder
     from repair.study.rows import COLUMNS, SweepSettings
     from repair.study.run import sweep as run_sweep
     from repair.study.store import write_sweep
 
+    if arguments.jobs < 1:
+        raise UsageError(f"--jobs is {arguments.jobs}; at least one worker process is needed")
+    if not arguments.timeout > 0.0:
+        raise UsageError(f"--timeout is {arguments.timeout:g} s; it has to be positive")
     for name in arguments.reference or []:
         if name not in (known := reference_names()):
             raise UsageError(f"reference {name!r} is none of {', '.join(known)}")
@@ -51,6 +56,10 @@ def sweep(arguments: argparse.Namespace) -> int:
         preset=arguments.preset, overrides=arguments.overrides, official=not arguments.no_official,
         certify=arguments.certify, timeout=arguments.timeout, jobs=arguments.jobs,
     )  # fmt: skip
+    for target in filter(None, (arguments.out, arguments.report and arguments.report.parent)):
+        require_folder(target)
+    if arguments.report is not None and arguments.report.is_dir():
+        raise UsageError(f"the report {arguments.report} is a folder; the name of a file is wanted")
     rows = run_sweep(arguments.folder, settings)
     if arguments.report is not None:
         from repair.io.files import write_files
@@ -59,7 +68,8 @@ def sweep(arguments: argparse.Namespace) -> int:
         chosen = (("backend", settings.backends), ("reference", settings.references))
         words = [f"--{k} {' '.join(v)}" for k, v in chosen]
         text = sweep_report(rows, f"repair sweep {arguments.folder.name} {' '.join(words)}")
-        print(*write_files(arguments.report.parent, {arguments.report.name: text.encode()}))
+        content = {arguments.report.name: text.encode("utf-8", "backslashreplace")}
+        print(*write_files(arguments.report.parent, content))
     if arguments.out is None and arguments.report is None:
         import csv
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from repair.errors import ConfigError
+from repair.errors import ConfigError, in_words, kind_of
 
 __all__ = ["Layer", "dotted", "explain", "merged", "read_yaml", "require_sections"]
 
@@ -59,18 +59,28 @@ def dotted(overrides: Iterable[str] | Mapping[str, Any]) -> Any:
         for key, value in overrides.items():
             try:
                 OmegaConf.update(layer, key, _plain(value))
-            except (OmegaConfBaseException, ValueError, TypeError, AttributeError) as error:
-                message = str(error).splitlines()[0]
-                raise ConfigError(f"overrides: configuration key {key!r} is {value!r}: {message}") from error
+            except (OmegaConfBaseException, ValueError, TypeError, AttributeError, RecursionError) as error:
+                raise ConfigError(
+                    f"overrides: configuration key {in_words(key)} is {in_words(value)}: {_first_line(error)}"
+                ) from error
         return layer
-    items = list(overrides)
+    if isinstance(overrides, (str, bytes)):
+        raise ConfigError(
+            f"overrides are {in_words(overrides)}; they have to be a list of key=value texts, or a mapping"
+        )
+    try:
+        items = list(overrides)
+    except TypeError as error:
+        raise ConfigError(
+            f"overrides are {kind_of(overrides)}; they have to be a list of key=value texts, or a mapping"
+        ) from error
     for item in items:
         if not isinstance(item, str) or "=" not in item or not item.split("=", 1)[0].strip():
-            raise ConfigError(f"override {item!r} must have the form key=value")
+            raise ConfigError(f"override {in_words(item)} must have the form key=value")
     try:
         return OmegaConf.from_dotlist(items)
-    except (YAMLError, ValueError, TypeError) as error:
-        raise ConfigError(f"overrides {items} cannot be read: {str(error).splitlines()[0]}") from error
+    except (OmegaConfBaseException, YAMLError, ValueError, TypeError, RecursionError) as error:
+        raise ConfigError(f"overrides {in_words(items)} cannot be read: {_first_line(error)}") from error
 
 
 def _plain(value: Any) -> Any:
@@ -94,7 +104,7 @@ def require_sections(layer: Layer, schema: Any, prefix: str = "", node: Any = No
         if isinstance(expected, DictConfig):
             value = node._get_node(key)
             if not isinstance(value, DictConfig) or value._is_none():
-                shown = "empty" if value._is_none() else str(value)
+                shown = "empty" if value._is_none() else _short(str(value))
                 named = f"{layer.name}: configuration key '{prefix}{key}' is {shown}"
                 raise ConfigError(f"{named}; it must hold a mapping of keys")
             if not value._is_interpolation():
@@ -114,18 +124,29 @@ def merged(name: str, *nodes: Any, known: Callable[[], Collection[str]]) -> Any:
 
     try:
         return OmegaConf.merge(*nodes)
-    except (OmegaConfBaseException, ValueError, TypeError) as error:
+    except (OmegaConfBaseException, ValueError, TypeError, ArithmeticError, RecursionError) as error:
         raise ConfigError(explain(name, error, known())) from error
 
 
 def explain(layer: str, error: Exception, known: Collection[str]) -> str:
     """OmegaConf's error as a sentence about a key."""
     key = getattr(error, "full_key", None) or ""
-    message = str(error).splitlines()[0].rstrip(".")
+    message = _first_line(error).rstrip(".")
     if "not in" in message and key:
         import difflib
 
         close = difflib.get_close_matches(key, sorted(known), n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
-        return f"{layer}: there is no configuration key {key!r}{hint}"
+        if key in known:  # in a file its parts are sections
+            hint = "; write each part of the name as a mapping of its own"
+        return f"{layer}: there is no configuration key {in_words(key)}{hint}"
     return f"{layer}: configuration key {key!r}: {message}" if key else f"{layer}: {message}"
+
+
+def _first_line(error: Exception) -> str:
+    """What a foreign error says first."""
+    return _short((str(error).splitlines() or [""])[0]) or type(error).__name__
+
+
+def _short(text: str, most: int = 200) -> str:
+    return text if len(text) <= most else f"{text[:most]}..."

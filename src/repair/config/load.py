@@ -12,7 +12,7 @@ from typing import Any
 
 from repair.config.layers import Layer, dotted, explain, merged, read_yaml, require_sections
 from repair.config.schema import Config, configuration_keys, key_names, schema, values_of, words_of
-from repair.errors import ConfigError
+from repair.errors import ConfigError, in_words, path_of
 from repair.settings import require_sane
 
 __all__ = ["RETIRED", "load_config", "preset_names", "preset_path", "recorded_config"]
@@ -35,8 +35,8 @@ def preset_path(name: str) -> Path:
     ConfigError
         If there is none of that name; the sentence lists those that there are.
     """
-    if name not in preset_names():
-        raise ConfigError(f"preset {name!r} is unknown; there are {', '.join(preset_names())}")
+    if not isinstance(name, str) or name not in preset_names():
+        raise ConfigError(f"preset {in_words(name)} is unknown; there are {', '.join(preset_names())}")
     return _PRESETS / f"{name}.yaml"
 
 
@@ -68,7 +68,8 @@ def load_config(
     if preset is not None:
         layers.append(Layer(f"preset {preset}", read_yaml(preset_path(preset))))
     if file is not None:
-        layers.append(Layer(str(file), read_yaml(Path(file))))
+        path = path_of(file, "a configuration file", ConfigError)
+        layers.append(Layer(str(path), read_yaml(path)))
     own = [Layer("overrides", dotted(overrides)), Layer("overrides", dotted(_named(named)))]
     config = _resolved(layers, own)
     _require_effect(config)
@@ -119,8 +120,12 @@ def _leaves(node: Any, prefix: str = "") -> Iterator[str]:
 def _with_backend_section(found: Any, explicit: list[Layer]) -> Any:
     """Lay ``for_backend.<backend>`` over the rest, and what the user said explicitly over that."""
     from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
 
-    section = found.for_backend.get(found.backend)
+    try:
+        section = found.for_backend.get(found.backend)
+    except OmegaConfBaseException as error:  # an interpolation that leads nowhere
+        raise ConfigError(explain("configuration", error, key_names())) from error
     found.for_backend = {}
     if section is None:
         return found

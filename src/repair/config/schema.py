@@ -10,7 +10,7 @@ from typing import Any
 from repair.baselines.evasive.settings import EvasiveConfig
 from repair.check.registry import CHECKS
 from repair.check.settings import CheckerConfig
-from repair.errors import BackendError, ConfigError
+from repair.errors import BackendError, ConfigError, in_words
 from repair.metrics.registry import METRICS
 from repair.problem.settings import LimitsConfig, RepairConfig
 from repair.reference.registry import SOURCES
@@ -19,10 +19,12 @@ from repair.registry import Registry
 from repair.scene.settings import SceneConfig
 from repair.search.rules import RULES
 from repair.search.settings import SearchConfig
-from repair.settings import Key, keys_of, setting
+from repair.settings import Key, keys_of, require_type, setting
 from repair.solvers.registry import backend_names, sections
 
-__all__ = ["Config", "configuration_keys", "key_names", "schema", "values_of", "words_of"]
+__all__ = [
+    "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "words_of",
+]  # fmt: skip
 
 _REGISTRIES: Mapping[str, Registry[Any]] = {r.kind: r for r in (CHECKS, METRICS, RULES, SOURCES)}
 
@@ -172,3 +174,21 @@ def words_of(key: Key) -> tuple[str, ...] | None:
 def values_of(config: Config) -> dict[str, Any]:
     """All values by dotted key."""
     return {key.name: reduce(getattr, key.name.split("."), config) for key in _keys()}
+
+
+def require_types(config: Config) -> None:
+    """Refuse a configuration that was made by hand, and holds values of other types than its keys.
+
+    Raises
+    ------
+    ConfigError
+        Naming the key, what it got and what it expects.
+    """
+    for key in _keys():
+        value: Any = config
+        for name in key.name.split("."):
+            if not hasattr(value, name):
+                owner = key.name.rpartition(".")[0]
+                raise ConfigError(f"configuration section {owner!r} is {in_words(value)}; it has no {name!r}")
+            value = getattr(value, name)
+        require_type(key, value)

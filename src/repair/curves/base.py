@@ -11,7 +11,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.timegrid import INSTANT
 
-__all__ = ["Curve", "FrenetTrajectory", "SplicedCurve"]
+__all__ = ["Curve", "FrenetTrajectory", "Hulled", "SplicedCurve"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,28 @@ class Curve(Protocol):
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate at the times ``t`` (K,); outside the span the curve is extended from its end state."""
+        ...
+
+
+@runtime_checkable
+class Hulled(Protocol):
+    """A curve whose speed is bounded at all times by the hull of its control points."""
+
+    @property
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        ...
+
+    def speed_hulls(self, cuts: int = 1) -> tuple[Array, Array, Array]:
+        """Bounds of s' over parts of the curve, each polynomial piece cut into ``cuts``.
+
+        Returns
+        -------
+        times : (M,) array
+            When each part begins [s].
+        low, high : (M,) array
+            Bounds of s' over the part [m/s].
+        """
         ...
 
 

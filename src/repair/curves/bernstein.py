@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
+from repair.curves.hulls import speed_hulls
 from repair.curves.sampling import DENSE, KEPT, evaluated, hold_ends
 
 __all__ = ["BernsteinCurve", "bernstein_basis", "derivative_map", "sampling_at"]
@@ -63,6 +64,10 @@ class BernsteinCurve:
         """Control points (M, n + 1 - order, 2) of a derivative; their hull bounds it."""
         scale = factorial(self.degree) / factorial(self.degree - order) / self.duration**order
         return np.asarray(scale * np.diff(self.points, n=order, axis=1))
+
+    def speed_hulls(self, cuts: int = 1) -> tuple[Array, Array, Array]:
+        """Bounds of s' over parts of the curve (see :class:`repair.curves.base.Hulled`)."""
+        return speed_hulls(self.points[..., 0], self.t_start, self.duration, cuts)
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
 from repair.curves.bases import basis_matrix, bernstein_matrix, local_basis
+from repair.curves.hulls import speed_hulls
 from repair.curves.sampling import DENSE, KEPT, evaluated, hold_ends
 
 __all__ = ["UniformBSpline", "greville_offsets", "sampling_at"]
@@ -117,6 +118,12 @@ class UniformBSpline:
     def bernstein_segments(self) -> Array:
         """Bernstein control points of each segment, (n - p, p + 1, 2)."""
         return np.asarray(np.einsum("ij,kjd->kid", bernstein_matrix(self.degree), self.segments()))
+
+    def speed_hulls(self, cuts: int = 1) -> tuple[Array, Array, Array]:
+        """Bounds of s' over parts of the curve (see :class:`repair.curves.base.Hulled`)."""
+        windows = np.lib.stride_tricks.sliding_window_view(self.points[:, 0], self.degree + 1)
+        points = windows @ bernstein_matrix(self.degree).T
+        return speed_hulls(points, self.t_start, self.spacing, cuts)
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from repair.errors import OutputError
+from repair.errors import OutputError, in_words
 from repair.search.result import SearchStatus
 from repair.vehicle.parameters import VEHICLE_NAMES
 
@@ -37,7 +38,14 @@ def to_dynamic_obstacle(scene: Scene, states: DrivenStates, obstacle_id: int | N
     ----------
     obstacle_id : int, optional
         By default one that is free in the scenario.
+
+    Raises
+    ------
+    OutputError
+        If the id is no whole number.
     """
+    if not isinstance(obstacle_id, (Integral, type(None))) or isinstance(obstacle_id, bool):
+        raise OutputError(f"an obstacle's id is a whole number, not {in_words(obstacle_id)}")
     from commonroad.geometry.shape import Rectangle
     from commonroad.prediction.prediction import TrajectoryPrediction
     from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
@@ -62,7 +70,7 @@ def to_dynamic_obstacle(scene: Scene, states: DrivenStates, obstacle_id: int | N
     # CommonRoad's predictions begin one step after the initial state; its collision checker relies on it.
     rest = driven[1:]
     prediction = TrajectoryPrediction(Trajectory(rest[0].time_step, rest), shape) if rest else None
-    return DynamicObstacle(obstacle_id, ObstacleType.CAR, shape, first, prediction)
+    return DynamicObstacle(int(obstacle_id), ObstacleType.CAR, shape, first, prediction)
 
 
 def no_solution_because(scene: Scene, status: SearchStatus) -> str:

@@ -12,6 +12,7 @@ from repair.outcome.data import Body, Box, Drawing, Line
 
 __all__ = ["drawing_from", "drawing_to_dict"]
 
+_HUGE = 1e9  # beyond that nothing is drawn
 _COLUMNS = ("t", "s", "l", "x", "y", "speed", "acceleration")
 
 
@@ -54,7 +55,7 @@ def drawing_from(content: Mapping[str, Any]) -> Drawing:
 
     Raises
     ------
-    KeyError, TypeError, ValueError, AttributeError
+    KeyError, TypeError, ValueError, AttributeError, ArithmeticError
         If it is incomplete or of another shape.
     """
     drawing = Drawing(
@@ -85,9 +86,46 @@ def drawing_from(content: Mapping[str, Any]) -> Drawing:
         areas=tuple(_array(x, 2) for x in content["areas"]),
         edges=tuple(_array(x, 2) for x in content["edges"]),
     )  # fmt: skip
+    _require_whole(drawing)
+    return drawing
+
+
+def _require_whole(drawing: Drawing) -> None:
+    """Refuse what could not be drawn.
+
+    Raises
+    ------
+    ValueError
+        Saying what is wrong.
+    """
     if not drawing.steps or not drawing.lines:
         raise ValueError("it has no lines")
-    return drawing
+    if not all(0 <= step < _HUGE for step in drawing.steps):
+        raise ValueError("it has a step before the first one")
+    columns = [
+        *([getattr(x, name) for name in _COLUMNS] for x in drawing.lines),
+        *([x.t, x.low, x.high] for x in drawing.boxes),
+    ]
+    if any(len({len(column) for column in one}) > 1 for one in columns):
+        raise ValueError("the columns of a line or a box differ in length")
+    if any(not len(one[0]) or not np.isfinite(one[0]).all() for one in columns):
+        raise ValueError("a line or a box lacks times")
+    if not all(np.isfinite(getattr(x, name)).all() for x in drawing.lines for name in _COLUMNS):
+        raise ValueError("a line lacks numbers")
+    outlines = [outline for x in drawing.bodies for outline in x.outlines.values()]
+    shapes = [drawing.ego, drawing.body, *outlines, *drawing.areas, *drawing.edges]
+    if any(not len(shape) or not np.isfinite(shape).all() for shape in shapes):
+        raise ValueError("a shape lacks points")
+    placed = drawing.unrepaired
+    if placed is not None and (len(placed) != 3 or not np.isfinite(placed).all()):
+        raise ValueError("the ego has no place at the conflict")
+    single = np.array([drawing.start_s, drawing.s_offset, drawing.until])
+    if not np.isfinite(single).all():
+        raise ValueError("it has no end")
+    centres = [x.centres for x in drawing.bodies]
+    for numbers in (single, *shapes, *centres, *(x for one in columns for x in one)):
+        if (np.abs(numbers) > _HUGE).any():
+            raise ValueError("a number is out of range")
 
 
 def _rows(values: Array) -> list[list[float | None]]:

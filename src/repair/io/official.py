@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from repair.io.plotting import import_matplotlib
+
 __all__ = ["OfficialVerdict", "check_solution_file"]
 
 
@@ -57,11 +59,12 @@ def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> Of
     RepairError
         If the file is no solution file.
     """
-    from commonroad_dc.feasibility import solution_checker
-
     from repair.scene.reading import read_solution
 
     solution = read_solution(file)
+    import_matplotlib()  # the drivability checker does, with whatever MPLBACKEND says
+    from commonroad_dc.feasibility import solution_checker
+
     try:
         answers = solution_checker.solution_feasible(solution, scenario.dt, planning_problems)
         feasible = all(bool(answer[0]) for answer in answers.values())

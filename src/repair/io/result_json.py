@@ -7,8 +7,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from repair.errors import RepairError
+from repair.errors import RepairError, in_words, path_of
 from repair.io.drawing_json import drawing_from, drawing_to_dict
+from repair.io.record_check import Damage, require_record
 from repair.outcome.data import Outcome
 
 __all__ = ["DRAWING_FILE", "RESULT_FILE", "drawing_bytes", "load_result", "read_record", "to_json"]
@@ -17,10 +18,14 @@ RESULT_FILE, DRAWING_FILE = "result.json", "drawing.json"
 
 
 def to_json(content: dict[str, Any]) -> str:
-    """Strict JSON text, one key a line, number lists on one line."""
+    """Strict JSON text, one key a line, number lists on one line.
+
+    It can be written as UTF-8 whatever it holds: what is left of a file name that is no UTF-8 is escaped.
+    """
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     flat = re.compile(r"\[\s+((?:-?[\d.eE+-]+|null)(?:,\s+(?:-?[\d.eE+-]+|null))*)\s+\]")
-    return flat.sub(lambda m: "[" + re.sub(r"\s+", " ", m.group(1)) + "]", text) + "\n"
+    text = flat.sub(lambda m: "[" + re.sub(r"\s+", " ", m.group(1)) + "]", text) + "\n"
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")  # \udcff: JSON's own notation
 
 
 def drawing_bytes(outcome: Outcome) -> bytes | None:
@@ -38,18 +43,42 @@ def read_record(folder: Path) -> dict[str, Any]:
     Raises
     ------
     RepairError
-        If there is none, it cannot be read, or it is not the result of a repair.
+        If there is none, it cannot be read, is not the result of a repair, or was edited so that it holds
+        what no repair writes; the sentence names the key.
     """
+    folder = path_of(folder, "the folder of a result", RepairError)
     file = folder / RESULT_FILE
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise RepairError(f"{folder} holds no {RESULT_FILE}") from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise RepairError(f"{file} cannot be read: {error}") from error
-    if not isinstance(content, dict) or "status" not in content or "config" not in content:
+        if folder.is_file():
+            raise RepairError(f"{folder} is a file; the folder is wanted that holds {RESULT_FILE}")
+        if not file.exists():
+            raise RepairError(f"{folder} holds no {RESULT_FILE}")
+    except OSError as error:
+        raise RepairError(f"{file} cannot be read: {error.strerror or error}") from error
+    content = _read(file)
+    if (
+        not isinstance(content, dict)
+        or "status" not in content
+        or not isinstance(content.get("config"), dict)
+    ):
         raise RepairError(f"{file} is not the result of a repair")
+    try:
+        require_record(content)
+    except Damage as error:
+        raise RepairError(f"{file} is damaged: {error}") from error
     return content
+
+
+def _read(file: Path) -> Any:
+    """Strict JSON from a file; without NaN and infinity."""
+
+    def constant(word: str) -> float:
+        raise ValueError(f"{word} is no JSON")
+
+    try:
+        return json.loads(file.read_text(encoding="utf-8"), parse_constant=constant)
+    except (OSError, ValueError, RecursionError) as error:  # also what is no UTF-8, and no JSON
+        raise RepairError(f"{file} cannot be read: {in_words(error)}") from error
 
 
 def load_result(folder: str | Path) -> Outcome:
@@ -71,18 +100,16 @@ def load_result(folder: str | Path) -> Outcome:
     RepairError
         If a file is missing, cannot be read or is damaged; the sentence names it.
     """
-    folder = Path(folder)
+    folder = path_of(folder, "the folder of a result", RepairError)
     record = read_record(folder)
     name = record.get("drawing_file")
     if name is None:
         return Outcome(record)
     file = folder / str(name)
+    if not file.is_file():
+        raise RepairError(f"the drawing {file} of the result is not there any more")
     try:
-        drawing = drawing_from(json.loads(file.read_text(encoding="utf-8")))
-    except FileNotFoundError as error:
-        raise RepairError(f"the drawing {file} of the result is not there any more") from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise RepairError(f"{file} cannot be read: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise RepairError(f"{file} is damaged: {type(error).__name__} {error}") from error
+        drawing = drawing_from(_read(file))
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        raise RepairError(f"{file} is damaged: {type(error).__name__} {in_words(error)}") from error
     return Outcome(record, drawing)

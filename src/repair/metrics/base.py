@@ -57,6 +57,11 @@ class Asked:
         """The fixed evasive manoeuvres, rolled out."""
         return evasive_ttr(self.situation, self.settings)
 
+    @property
+    def evaded(self) -> bool:
+        """Whether that has been done."""
+        return "evasive" in vars(self)
+
 
 #: Measures a reference in its situation.
 Metric = Callable[[Asked], MetricValue]

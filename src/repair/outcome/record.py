@@ -16,6 +16,7 @@ from repair.check.peaks import Peaks
 from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
+from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
 from repair.prepare import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
@@ -64,7 +65,9 @@ def record_of(
         "provenance": provenance(scene),
         "backend": prepared.config.backend,
         "status": found.status.value,
-        "status_sentence": found.status.sentence,
+        "status_sentence": status_sentence(prepared, found),
+        "checked_until_s": number(checked_until(prepared, found)),
+        "checks_off": list(checks_off(prepared.config.checker)),
         "complete": found.complete,
         "ttc_s": number(conflict.time),
         "contact_ttc_s": number(conflict.contact_time),
@@ -76,6 +79,8 @@ def record_of(
             "contact_obstacle_id": conflict.contact_id,
             "contact_t_s": number(conflict.contact_time),
             "from_behind": conflict.from_behind,
+            "margin_only": margin_only(conflict),
+            "detail": str(getattr(conflict, "detail", "")),
         },
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,
@@ -87,7 +92,7 @@ def record_of(
         "trajectory": _trajectory(prepared, found, states),
         "limits": _limits(prepared.limits),
         "capabilities": asdict(capabilities),
-        "notes": list(prepared.notes),
+        "notes": [*prepared.notes, *filter(None, [one_point(prepared, found)])],
         "solution_file": None,
         "figure_files": [],
         "scenario_file": None,
@@ -132,7 +137,12 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "feasible": probe.feasible,
         "reasons": list(probe.verdict.reasons),
         "details": [
-            {"reason": v.reason.value, "t_s": number(v.time), "detail": v.detail}
+            {
+                "reason": v.reason.value,
+                "t_s": number(v.time),
+                "detail": v.detail,
+                "obstacle_id": getattr(v, "obstacle_id", None),
+            }
             for v in probe.verdict.violations
         ],
         "maneuver": probe.maneuver.value if probe.maneuver is not None else None,
@@ -140,7 +150,7 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "tried": list(probe.tried),
         "solver_status": solve.status.value,
         "solver_detail": solve.detail,
-        "iterations": solve.iterations,
+        "iterations": int(solve.iterations),
         "objective": number(solve.objective),
         **peaks_to_dict(probe_peaks(prepared, probe)),
         "residuals": {name: number(value, 12) for name, value in solve.residuals.items()},

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from repair.errors import ScenarioError
+from repair.errors import ScenarioError, in_words
 
 __all__ = ["OFFICIAL_FILES", "PAPER_SCENARIOS", "find_scenario", "paper_scenario"]
 
@@ -31,13 +31,16 @@ def find_scenario(name: str) -> Iterator[Path]:
     Raises
     ------
     ScenarioError
-        If COMMONROAD_SCENARIOS is set and the file is neither there nor here.
+        If COMMONROAD_SCENARIOS is set and the file is neither there nor here, or no file can have that name.
     """
     path, folder = Path(name), os.environ.get("COMMONROAD_SCENARIOS")
     candidates = [path]
     if folder and not path.is_absolute():
         candidates += [Path(folder) / name, Path(folder) / f"{name}.xml"]
-    existing = next((p for p in candidates if p.is_file()), None)
+    try:
+        existing = next((p for p in candidates if p.is_file()), None)
+    except (OSError, ValueError) as error:  # a name that is too long, or cannot be spelt
+        raise ScenarioError(f"{in_words(name)} is not the name of a file: {in_words(error)}") from error
     if existing is None and name in PAPER_SCENARIOS:
         with _reconstruction(name) as written:
             yield written

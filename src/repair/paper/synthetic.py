@@ -42,6 +42,9 @@ def write_scenario(name: str, folder: str | Path) -> Path:
     OutputError
         If the file cannot be written.
     """
+    from repair.scene.reading import require_commonroad
+
+    require_commonroad()
     from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
 
     if name not in SCENARIOS:

@@ -76,7 +76,14 @@ class ProblemFactory:
             if problems:
                 yield problems
 
-    def at(self, t_rep: float, margin: float | None = None) -> tuple[RepairProblem, ...]:
+    def widened(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
+        """The problems again with larger and larger margins, as ``repair.widen`` lists them."""
+        for more in self.settings.widen:
+            problems = self.at(t_rep, self.settings.margin + more, more)
+            if problems:
+                yield problems
+
+    def at(self, t_rep: float, margin: float | None = None, room: float = 0.0) -> tuple[RepairProblem, ...]:
         """One problem for each open side of passing, the gentlest guide first.
 
         Parameters
@@ -84,6 +91,8 @@ class ProblemFactory:
         margin : float, optional
             Distance to the inflated boxes [m]; negative values allow into them. By default
             ``repair.margin``.
+        room : float
+            What soft backends keep beyond ``repair.clearance`` [m].
         """
         settings = self.settings
         margin = settings.margin if margin is None else margin
@@ -102,7 +111,7 @@ class ProblemFactory:
         # on any path that it can drive at all.
         return tuple(
             self._problem(
-                t_rep, start, occupancy, margin, passing,
+                t_rep, start, occupancy, margin, room, passing,
                 lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings
@@ -128,11 +137,12 @@ class ProblemFactory:
         columns = (guide.t, guide.position, guide.velocity, guide.acceleration, guide.jerk)
         path = FrenetTrajectory(*(frozen(column) for column in columns))
         passing = Passing(kind, path, sides_of(guide.position, lower, upper), 0.0)
-        return self._problem(t_rep, start, occupancy, settings.margin, passing, lateral)
+        return self._problem(t_rep, start, occupancy, settings.margin, 0.0, passing, lateral)
 
     def _problem(
-        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing, lateral: bool
-    ) -> RepairProblem:
+        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, room: float, passing: Passing,
+        lateral: bool,
+    ) -> RepairProblem:  # fmt: skip
         s, curvature = self._axis
         return RepairProblem(
             reference=self.reference,
@@ -142,7 +152,7 @@ class ProblemFactory:
             occupancy=occupancy,
             bounds=self.bounds,
             limits=self.limits,
-            clearance=self.settings.clearance,
+            clearance=self.settings.clearance + room,
             margin=margin,
             passing=passing,
             curvature_s=s,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from repair.problem.settings import LimitsConfig
@@ -16,7 +16,7 @@ __all__ = ["Limits", "resolve_limits"]
 
 @dataclass(frozen=True)
 class Limits:
-    """What the ego may do; every backend and the checker read the same numbers.
+    """What the ego may do.
 
     Attributes
     ----------
@@ -45,6 +45,17 @@ class Limits:
     j_lon: float
     j_lat: float
     curvature: float
+
+    def reserving(self, share: float) -> Limits:
+        """The same with a share of every acceleration left unused."""
+        rest = 1.0 - share
+        return replace(
+            self,
+            a_min=rest * self.a_min,
+            a_max=rest * self.a_max,
+            a_lat=rest * self.a_lat,
+            a_total=rest * self.a_total,
+        )
 
 
 # Share of the vehicle's friction circle that a repair may use where nothing else is configured:

@@ -47,10 +47,21 @@ class RepairConfig:
     )
     clearance: float = setting(0.3, "the paper's s_f [m]", low=0.0, high=50.0)
     margin: float = setting(0.1, "distance hard backends keep from the inflated box [m]", low=0.0, high=50.0)
+    reserve: float = setting(
+        0.015,
+        "share of the acceleration limits that backends leave unused: they look at samples, the check at all",
+        low=0.0,
+        high=0.5,
+    )
     relax: list[float] = setting(
-        factory=lambda: [-0.1, -0.5, -1.2, -2.5],
+        factory=lambda: [-0.1, -0.3, -0.6, -1.3, -2.5],
         # Down to the vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
         says="margins [m] that hard backends try next where none of the manoeuvres is feasible",
+    )
+    widen: list[float] = setting(
+        factory=lambda: [0.3, 0.6],
+        # A box in (s, l) is narrower than the vehicle in a bend or at an angle to the path.
+        says="what is added to margin and clearance [m], one after the other, where a curve came too close",
     )
     lateral: str = setting(
         "road",

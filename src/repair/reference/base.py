@@ -47,4 +47,4 @@ class ReferenceSource:
         for name in ("make", "along"):
             value: Any = getattr(self, name)
             if not (callable(value) or isinstance(value, str) or (value is None and name == "along")):
-                raise TypeError(f"{name} of a reference source is {value!r}; it has to be callable")
+                raise ConfigError(f"{name} of a reference source is {in_words(value)}; it has to be callable")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.reference.profile import SpeedProfile
+from repair.timegrid import STEP, steps_until
 
 if TYPE_CHECKING:
     from repair.reference.settings import ReferenceConfig
@@ -28,8 +29,14 @@ def accelerating(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) ->
     """1 m/s² up to the speed limit, or to 13.9 m/s where there is no sign."""
     s0, v0 = float(scene.start[0, 0]), float(scene.start[1, 0])
     target = max(v0, limit_at(scene, s0))
-    ramp = min(target - v0, scene.horizon)
-    return SpeedProfile.from_accelerations(s0, v0, [ramp, max(scene.horizon - ramp, 0.0)], [1.0, 0.0])
+    # What is left of the ramp after whole steps is spread over one more: the vehicle is steered step by step,
+    # and no constant input of a step would end the ramp within it.
+    whole = min(steps_until(target - v0, scene.dt), scene.n_steps)
+    rest = (target - v0 - whole * scene.dt) / scene.dt if whole < scene.n_steps else 0.0
+    rest = max(rest, 0.0) if rest > STEP else 0.0
+    durations = [whole * scene.dt, scene.dt if rest else 0.0]
+    durations.append(max(scene.horizon - sum(durations), 0.0))
+    return SpeedProfile.from_accelerations(s0, v0, durations, [1.0, rest, 0.0])
 
 
 def limit_at(scene: Scene, s: float) -> float:

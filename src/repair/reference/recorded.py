@@ -1,18 +1,25 @@
-"""References that were driven before: a recorded obstacle, or a solution file."""
+"""References that were driven before: a recorded obstacle, or a solution file.
+
+Both are taken as they are or not at all: a gap in time, a number that is none, states that contradict each
+other beyond what CommonRoad's own checks allow (:mod:`repair.reference.consistency`), or another start than
+the ego's are errors that name the first place. What ends early is a reference until there and no further.
+"""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from repair.arrays import Array, frozen
-from repair.curves.bases import basis_matrix, n_points_for
+from repair.arrays import Array
 from repair.curves.bspline import UniformBSpline
-from repair.curves.fitting import splice_points
-from repair.errors import ReferenceTrajectoryError, ScenarioError
+from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError
+from repair.reference.consistency import Recording, require_consistent, require_start
+from repair.reference.fit import fit_positions
 from repair.reference.settings import ReferenceConfig
+from repair.vehicle.parameters import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
@@ -26,9 +33,6 @@ __all__ = [
     "solution_reference",
 ]
 
-_SPEED_MAX = 150.0  # faster than this a recording jumps [m/s]
-_START_OFF = 1.0  # a reference may start this far from the ego [m]
-
 
 def obstacle_positions(scene: Scene, config: ReferenceConfig) -> Array:
     """Centre positions (T, 2) of a recorded obstacle at the scenario's steps.
@@ -36,9 +40,9 @@ def obstacle_positions(scene: Scene, config: ReferenceConfig) -> Array:
     Raises
     ------
     ReferenceTrajectoryError
-        If there is no such obstacle, or it jumps.
+        If there is no such obstacle, or its states contradict each other.
     """
-    return _without_jumps(scene, *_recorded(scene, config.obstacle_id))[0]
+    return _padded(scene, _recorded(scene, config.obstacle_id))
 
 
 def solution_positions(scene: Scene, config: ReferenceConfig) -> Array:
@@ -47,29 +51,45 @@ def solution_positions(scene: Scene, config: ReferenceConfig) -> Array:
     Raises
     ------
     ReferenceTrajectoryError
-        If there is no such file, it is of another scenario, or it jumps.
+        If there is no such file, it is of another scenario, or its states have a gap, contradict each other
+        or do not start with the ego.
     """
-    return _without_jumps(scene, *_from_solution(scene, config.file))[0]
+    return _padded(scene, _from_solution(scene, config.file))
 
 
 def recorded_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
-    """A spline through the positions of a recorded obstacle."""
-    return _fit_positions(scene, *_without_jumps(scene, *_recorded(scene, config.obstacle_id)))
+    """A spline through the positions of a recorded obstacle, until its last one."""
+    return _fitted(scene, _recorded(scene, config.obstacle_id), noisy=True)
 
 
 def solution_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
-    """A spline through the positions in a solution file."""
-    return _fit_positions(scene, *_without_jumps(scene, *_from_solution(scene, config.file)))
+    """A spline through the positions in a solution file, until the last one."""
+    return _fitted(scene, _from_solution(scene, config.file))
 
 
-def _without_jumps(scene: Scene, positions: Array, what: str) -> tuple[Array, str]:
-    moved = np.hypot(*np.diff(positions[: known_until(positions)], axis=0).T)
-    if (moved > _SPEED_MAX * scene.dt).any():
-        raise ReferenceTrajectoryError(f"{scene.id}: {what} jumps by {moved.max():.3g} m within a time step")
-    return positions, what
+def known_until(positions: Array) -> int:
+    """Number of leading positions (T, 2) without a gap."""
+    known = np.asarray(np.isfinite(positions).all(axis=1))
+    return len(known) if known.all() else int(np.argmin(known))
 
 
-def _recorded(scene: Scene, obstacle_id: int | None) -> tuple[Array, str]:
+def _fitted(scene: Scene, recording: Recording, *, noisy: bool = False) -> UniformBSpline:
+    positions = recording.positions[: scene.n_steps + 1]
+    return fit_positions(scene, positions, recording.speeds, recording.what, noisy=noisy)
+
+
+def _padded(scene: Scene, recording: Recording) -> Array:
+    """Positions (T, 2) at the scene's steps, NaN from where they are not known on."""
+    positions = np.full((scene.n_steps + 1, 2), np.nan)
+    known = recording.positions[: scene.n_steps + 1]
+    positions[: len(known)] = known
+    return positions
+
+
+# -- recorded obstacles ------------------------------------------------------------------------------
+
+
+def _recorded(scene: Scene, obstacle_id: int | None) -> Recording:
     if obstacle_id is None:
         obstacle = scene.recorded_ego
         if obstacle is None:
@@ -83,11 +103,31 @@ def _recorded(scene: Scene, obstacle_id: int | None) -> tuple[Array, str]:
                 f"{scene.id}: there is no obstacle {obstacle_id} to take the reference from"
             )
         obstacle = found[0]
-    return obstacle.states[:, :2], f"obstacle {obstacle.id}"
+    what = f"{scene.id}: obstacle {obstacle.id}"
+    states = obstacle.states
+    there = np.asarray(np.isfinite(states[:, :2]).all(axis=1))
+    last = known_until(states[:, :2])
+    if last == 0:
+        raise ReferenceTrajectoryError(
+            f"{what} is not there at time step {scene.initial_time_step}, where the planning problem starts"
+        )
+    if there[last:].any():
+        again = last + int(np.argmax(there[last:]))
+        raise ReferenceTrajectoryError(
+            f"{what} is not there from time step {scene.initial_time_step + last} to "
+            f"{scene.initial_time_step + again - 1}; a reference has no gap"
+        )
+    nothing = np.full(last, np.nan)  # of recordings only the positions count: their speeds are estimates
+    made = Recording(what, scene.initial_time_step, states[:last, :2], nothing, states[:last, 3], nothing)
+    require_consistent(made, scene.dt)
+    return made
 
 
-def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
-    """Reference from a CommonRoad solution file of the same scenario."""
+# -- solution files ----------------------------------------------------------------------------------
+
+
+def _from_solution(scene: Scene, file: str | None) -> Recording:
+    """What a CommonRoad solution file of the same scenario holds for the planning problem."""
     if not file:
         raise ReferenceTrajectoryError("reference.source is file, but reference.file names no solution file")
     from repair.scene.reading import read_solution
@@ -106,55 +146,67 @@ def _from_solution(scene: Scene, file: str | None) -> tuple[Array, str]:
         raise ReferenceTrajectoryError(
             f"{path} holds no solution for planning problem {scene.planning_problem_id}"
         )
-    return _positions(scene, matching[0], path), str(path)
+    vehicle = _vehicle_of(matching[0], scene.vehicle)
+    made = _states(matching[0].trajectory.state_list, str(path), scene.initial_time_step, vehicle)
+    start = scene.initial_state
+    require_start(made, start.x, start.y, start.orientation, start.velocity)
+    require_consistent(made, scene.dt, vehicle)
+    return made
 
 
-def _positions(scene: Scene, solution: Any, path: Path) -> Array:
-    states = solution.trajectory.state_list
-    positions = np.full((scene.n_steps + 1, 2), np.nan)
+def _vehicle_of(solution: Any, usual: Vehicle) -> Vehicle:
+    """The vehicle that a solution was made for."""
+    try:
+        return load_vehicle(int(solution.vehicle_type.value))
+    except (AttributeError, TypeError, ValueError, ConfigError):
+        return usual
+
+
+def _states(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Recording:
+    """The states of a solution from step ``first`` on, one for each step.
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        If they begin elsewhere in time, have a gap, come twice, or hold a number that is none.
+    """
+    steps = [int(state.time_step) for state in states]
+    if steps[0] != first:
+        raise ReferenceTrajectoryError(
+            f"{what} begins at time step {steps[0]}, and not at the planning problem's "
+            f"initial time step {first}"
+        )
+    if getattr(states[0], "position", None) is None:
+        raise ReferenceTrajectoryError(f"{what} holds inputs; a reference takes states")
+    for k, following in pairwise(steps):
+        if following != k + 1:
+            wrong = f"goes from time step {k} to {following}"
+            wrong = f"has time step {k} twice" if following == k else wrong
+            raise ReferenceTrajectoryError(f"{what} {wrong}; a reference has one state for each step")
     for state in states:
-        step = state.time_step - scene.initial_time_step
-        if 0 <= step <= scene.n_steps and getattr(state, "position", None) is not None:
-            positions[step] = state.position
-    if not np.isfinite(positions[0]).all():
-        raise ReferenceTrajectoryError(f"{path} has no state at the planning problem's initial time step")
-    off = float(np.hypot(*(positions[0] - [scene.initial_state.x, scene.initial_state.y])))
-    if not off <= _START_OFF:
-        raise ReferenceTrajectoryError(f"{path} starts {off:.0f} m from the ego's initial position")
-    return positions
+        for name, value in vars(state).items():
+            if value is not None and not np.isfinite(np.asarray(value, dtype=np.float64)).all():
+                raise ReferenceTrajectoryError(f"{what}: at time step {state.time_step} {name} is not finite")
+    rows = np.array([_motion_of(state) for state in states], dtype=np.float64)
+    positions = np.array([state.position for state in states], dtype=np.float64)
+    behind = vehicle.rear if hasattr(states[0], "orientation") and not _slips(states[0]) else 0.0
+    return Recording(what, first, positions, rows[:, 0], rows[:, 1], rows[:, 2], behind)
 
 
-def known_until(positions: Array) -> int:
-    """Number of leading positions (T, 2) without a gap."""
-    known = np.asarray(np.isfinite(positions).all(axis=1))
-    return len(known) if known.all() else int(np.argmin(known))
+def _slips(state: Any) -> bool:
+    """Whether a state's motion is stated at its centre: that of a point mass, or with a slip angle."""
+    return any(name in vars(state) for name in ("slip_angle", "velocity_y"))
 
 
-def _fit_positions(scene: Scene, positions: Array, what: str) -> UniformBSpline:
-    """Spline through recorded centre positions (T, 2), as far as they go without a gap."""
-    last = known_until(positions)
-    if last < 4:
-        raise ReferenceTrajectoryError(
-            f"{scene.id}: {what} is known for {last} steps only; a reference takes at least 4"
-        )
-    coordinates = scene.frame.to_frenet(positions[:last])
-    if not np.isfinite(coordinates).all():
-        raise ReferenceTrajectoryError(
-            f"{scene.id}: {what} leaves the neighbourhood of the route and cannot be a reference"
-        )
-    degree = 3
-    spacing = max(0.4, 2.0 * scene.dt)
-    duration = (last - 1) * scene.dt
-    n = n_points_for(duration, spacing, degree)
-    tau = np.arange(last) * scene.dt
-    basis = basis_matrix(tau, n, degree, spacing)
-    state = np.array([coordinates[0], scene.start[1], scene.start[2]])
-    if np.linalg.norm(coordinates[0] - scene.start[0]) > 0.5:
-        state[1] = (coordinates[1] - coordinates[0]) / scene.dt
-        state[2] = 0.0
-    head = splice_points(state, degree, spacing)
-    ridge = 1e-3 * np.diff(np.eye(n), n=3, axis=0)
-    left = np.vstack([basis, ridge])
-    right = np.vstack([coordinates, np.zeros((len(ridge), 2))]) - left[:, :degree] @ head
-    tail = np.linalg.lstsq(left[:, degree:], right, rcond=None)[0]
-    return UniformBSpline(0.0, spacing, degree, frozen(np.vstack([head, tail])))
+def _motion_of(state: Any) -> tuple[float, float, float]:
+    """Direction of motion, speed, and heading of the body; of a point mass the direction is all there is."""
+    forward, across = float(state.velocity), float(vars(state).get("velocity_y") or 0.0)
+    heading = vars(state).get("orientation")
+    if heading is None:
+        speed = float(np.hypot(forward, across))
+        direction = float(np.arctan2(across, forward)) if speed > 0.0 else np.nan
+        return direction, speed, np.nan
+    slip = vars(state).get("slip_angle")
+    beta = float(slip) if slip is not None else (float(np.arctan2(across, forward)) if across else 0.0)
+    speed = float(np.hypot(forward, across)) if across else forward
+    return float(heading) + beta, speed, float(heading)

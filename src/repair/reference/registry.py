@@ -9,13 +9,16 @@ from repair.curves.base import Curve
 from repair.errors import ConfigError, ReferenceTrajectoryError
 from repair.reference.base import Along, MakeReference, ReferenceSource
 from repair.registry import Registry, loaded
+from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
     from repair.reference.settings import ReferenceConfig
     from repair.scene.scene import Scene
     from repair.world.boxes import Occupancy
 
-__all__ = ["SOURCES", "make_reference", "positions_along", "register"]
+__all__ = ["SOURCES", "make_reference", "positions_along", "reference_notes", "register"]
+
+_SPEED_OFF = 0.05  # a start this much faster or slower than the planning problem's is said [m/s]
 
 SOURCES: Registry[ReferenceSource] = Registry(
     "reference source",
@@ -93,3 +96,17 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
             "with t_start, t_end and sample(t)"
         )
     return curve
+
+
+def reference_notes(scene: Scene, curve: Curve) -> tuple[str, ...]:
+    """What has to be said about a reference: until when it is known, and a start unlike the ego's."""
+    notes = []
+    own, given = float(curve.sample([curve.t_start]).velocity[0, 0]), float(scene.start[1, 0])
+    if abs(own - given) > _SPEED_OFF:
+        notes.append(f"the reference starts with {own:.2f} m/s, the planning problem with {given:.2f} m/s")
+    if curve.t_end < scene.horizon - INSTANT:
+        notes.append(
+            f"the reference ends at {curve.t_end:g} s, and so does what is said about it "
+            f"(the scenario goes on until {scene.horizon:g} s)"
+        )
+    return tuple(notes)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from repair.arrays import Array
+from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Drawing, Outcome
 from repair.report.lines import drawing_in, reference_line, repair_lines, title_of
 from repair.report.style import EGO, OBSTACLE, OTHERS, REFERENCE, STYLE, WIDTH
@@ -24,6 +25,7 @@ def birdseye_figure(outcome: Outcome) -> Any:
     -------
     matplotlib.figure.Figure
     """
+    import_matplotlib()
     from matplotlib import rc_context
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure

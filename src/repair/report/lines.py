@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from repair.errors import OutputError
+from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Drawing, Line, Outcome
 from repair.report.style import REFERENCE
 from repair.timegrid import STEP
@@ -59,11 +60,22 @@ def repair_lines(outcome: Outcome) -> list[Styled]:
     """The repairs of all visited times-to-repair, by t_rep, in the order of a colour-blind-safe map.
 
     Dashed is what did not pass a check; the F-TTR is the widest.
+
+    Raises
+    ------
+    OutputError
+        If what there is to draw is not of these times-to-repair.
     """
+    import_matplotlib()
     from matplotlib import colormaps
 
     curves = [line for line in drawing_in(outcome).lines if line.kind == "repair"]
     probes = [p for p in outcome.probes if _has_curve(p, curves)]
+    if len(probes) != len(curves):
+        raise OutputError(
+            f"the result of {outcome.scenario} does not fit what there is to draw: {len(curves)} repairs, "
+            f"and {len(probes)} times-to-repair of theirs"
+        )
     pairs = sorted(zip(curves, probes, strict=True), key=lambda pair: pair[0].t_rep or 0.0)
     shades: Any = np.linspace(0.08, 0.86, max(len(pairs), 2))[-len(pairs) :] if pairs else []
     return [

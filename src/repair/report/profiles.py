@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from repair.arrays import Array
+from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Outcome
 from repair.report.lines import Styled, drawing_in, reference_line, repair_lines, title_of
 from repair.report.style import EGO, OBSTACLE, STYLE, WIDTH
@@ -55,6 +56,7 @@ def stages_figure(outcome: Outcome, t_rep: float | None = None) -> Any:
 
 
 def _profiles(outcome: Outcome, lines: Sequence[Styled], title: str) -> Any:
+    import_matplotlib()
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 

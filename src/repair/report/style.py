@@ -5,6 +5,8 @@ from __future__ import annotations
 from io import BytesIO
 from typing import Any
 
+from repair.io.plotting import import_matplotlib
+
 __all__ = ["EGO", "OBSTACLE", "OTHERS", "REFERENCE", "STYLE", "WIDTH", "render"]
 
 WIDTH = 8.0  # in; at 150 dots per inch readable at the width of a README
@@ -20,6 +22,7 @@ STYLE: Any = {
 
 def render(figure: Any, file_format: str = "png") -> bytes:
     """A figure as the bytes of a file (``png``, ``pdf``, ``svg``), the same bytes for the same figure."""
+    import_matplotlib()
     from matplotlib import rc_context
 
     buffer = BytesIO()

@@ -55,6 +55,11 @@ def _avoidable(row: Row) -> bool:
     return isinstance(row["ttb_s"], float)
 
 
+def _kind(row: Row) -> str:
+    """What the conflict is; a margin that is entered without any contact is told apart."""
+    return "margin only" if row.get("margin_only") else row["conflict"] or ""
+
+
 def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[str]) -> str:
     body = []
     for reference in references:
@@ -69,9 +74,11 @@ def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[
                 len(own) - sum(status[s] for s in ("no_conflict", "found", "none_feasible")),
                 f"{sum(r['status'] in _REPAIRED for r in braking)} of {len(braking)}",
                 round(median(times), 1) if times else None,
+                sum(bool(r.get("margin_only")) for r in own),
             ))  # fmt: skip
     head = ("reference", "backend", "files", "no conflict", "repaired", "none feasible", "other",
-            "repaired of those that braking at 8 m/s² avoids", "median search [ms]")  # fmt: skip
+            "repaired of those that braking at 8 m/s² avoids", "median search [ms]",
+            "conflicts that are margin only")  # fmt: skip
     return _table(head, body)
 
 
@@ -155,8 +162,10 @@ def _beyond_braking(rows: Sequence[Row]) -> str:
     if not found:
         return "None."
     head = ("file", "reference", "backend", "conflict", "TTC [s]", "TTR [s]", "F-TTR [s]", "manoeuvre")
-    keys = ("file", "reference", "backend", "conflict", "ttc_s", "ttr_s", "f_ttr_s", "maneuver")
-    return _table(head, [[r[k] for k in keys] for r in found])
+    keys = ("ttc_s", "ttr_s", "f_ttr_s", "maneuver")
+    return _table(
+        head, [[r["file"], r["reference"], r["backend"], _kind(r), *(r[k] for k in keys)] for r in found]
+    )
 
 
 def _reasons(rows: Sequence[Row]) -> str:
@@ -165,7 +174,7 @@ def _reasons(rows: Sequence[Row]) -> str:
         return "Everything was repaired."
     keys = ("file", "reference", "backend", "status", "conflict", "ttc_s", "ttb_s", "detail")
     head = (*keys[:5], "TTC [s]", "TTB [s]", "what was tried, and what it failed on")
-    body = [tuple(r[k] for k in keys) for r in missed]
+    body = [tuple(_kind(r) if k == "conflict" else r[k] for k in keys) for r in missed]
     return _table(head, body)
 
 
@@ -181,7 +190,7 @@ def _files(rows: Sequence[Row], backends: Sequence[str], reference: str) -> str:
     for file, cases in own.items():
         first = next(iter(cases.values()))
         behind = ", from behind" if first["from_behind"] else ""
-        cells: list[Any] = [file, f"{first['conflict'] or ''}{behind}"]
+        cells: list[Any] = [file, f"{_kind(first)}{behind}"]
         cells += [first[k] for k in ("ttc_s", "ttb_s", "ttr_s")]
         for backend in backends:
             r = cases.get(backend)

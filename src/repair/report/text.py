@@ -6,14 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from repair.report.notes import grouped
+
 __all__ = ["fixed", "probe_table", "summary"]
 
 _KINDS = {
     "margin": "the safety margin of obstacle {id} is entered",
     "collision": "obstacle {id} is touched",
     "off_road": "the reference leaves the road",
+    "limits": "the reference breaks a limit",
     "kinematics": "the reference becomes impossible to drive",
 }
+_EXTREMES = (
+    "peak_deceleration_mps2", "peak_acceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps",
+)  # fmt: skip
 _PROVENANCE = {
     "official": "official file, sha256 {sha}",
     "reconstruction": "reconstruction by this project from the paper, not an official file",
@@ -45,7 +51,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))
-    if content["metrics"]:
+    if content.get("metrics"):  # results of earlier versions have none
         rows.append(("Metrics", _metrics(content["metrics"])))
     lines = [f"{name:9} {text}" for name, text in rows]
     if not content["complete"]:
@@ -53,7 +59,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     if content["probes"]:
         lines += ["", *probe_table(content["probes"])]
     lines += ["", f"Time      {_times(content['time_s'])}"]
-    lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(content["notes"])]
+    lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(grouped(content["notes"]))]
     if written:
         lines += [f"{'Files' if k == 0 else '':9} {path}" for k, path in enumerate(written)]
     else:
@@ -67,11 +73,19 @@ def _ttc(content: dict[str, Any]) -> str:
         return "none: the reference runs into nothing"
     kind = conflict["kind"]
     what = _KINDS.get(kind, kind).format(id=conflict["obstacle_id"])
-    touch = content["contact_ttc_s"]
-    contact = ""
+    if conflict.get("detail"):
+        what += f" ({conflict['detail']})"
+    touch = content.get("contact_ttc_s")
+    same = conflict["obstacle_id"] == conflict.get("contact_obstacle_id")
+    if kind == "collision" and touch is not None and same:
+        behind = " from behind" if conflict.get("from_behind") else ""
+        return f"{content['ttc_s']:.2f} s on the scenario's grid: {what}{behind} at {touch:.2f} s"
+    contact = "; nothing is touched" if kind == "margin" else ""
     if touch is not None:
-        behind = ", from behind" if conflict["from_behind"] else ""
-        contact = f"; true shapes touch at {touch:.2f} s (obstacle {conflict['contact_obstacle_id']}{behind})"
+        behind = ", from behind" if conflict.get("from_behind") else ""
+        contact = (
+            f"; true shapes touch at {touch:.2f} s (obstacle {conflict.get('contact_obstacle_id')}{behind})"
+        )
     return f"{content['ttc_s']:.2f} s: {what}{contact}"
 
 
@@ -93,17 +107,22 @@ def _metrics(metrics: dict[str, Any]) -> str:
 
 
 def _extremes(content: dict[str, Any]) -> str:
-    return (
-        f"peak deceleration {fixed(content['peak_deceleration_mps2'])} m/s², "
-        f"peak lateral acceleration {fixed(content['peak_lateral_acceleration_mps2'])} m/s², "
-        f"minimum speed {fixed(content['min_speed_mps'])} m/s"
-    )
+    """Peaks by their sign: who only accelerates has no peak deceleration."""
+    low, high = content["peak_deceleration_mps2"], content.get("peak_acceleration_mps2")
+    parts = []
+    if low is not None and round(low, 2) < 0.0:
+        parts.append(f"peak deceleration {fixed(low)} m/s²")
+    if high is not None and (round(high, 2) > 0.0 or not parts):
+        parts.append(f"peak acceleration {fixed(max(high, 0.0))} m/s²")
+    parts.append(f"peak lateral acceleration {fixed(content['peak_lateral_acceleration_mps2'])} m/s²")
+    parts.append(f"minimum speed {fixed(content['min_speed_mps'])} m/s")
+    return ", ".join(parts)
 
 
 def probe_table(probes: list[dict[str, Any]]) -> list[str]:
     """The visited times-to-repair as lines, then what was wrong with each."""
-    head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_lat", "v_min", "solver", "solve", "check")
-    units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
+    head = ("t_rep", "verdict", "manoeuvre", "a_min", "a_max", "a_lat", "v_min", "solver", "solve", "check")
+    units = ("[s]", "", "", "[m/s²]", "[m/s²]", "[m/s²]", "[m/s]", "", "[ms]", "[ms]")
     table: list[tuple[str, ...]] = [head, units]
     for p in probes:
         table.append(
@@ -111,17 +130,14 @@ def probe_table(probes: list[dict[str, Any]]) -> list[str]:
                 f"{p['t_rep_s']:.2f}",
                 "feasible" if p["feasible"] else ", ".join(p["reasons"]),
                 (p["maneuver"] or "-").replace("_", " "),
-                *(
-                    fixed(p[k])
-                    for k in ("peak_deceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps")
-                ),
+                *(fixed(p.get(k)) for k in _EXTREMES),
                 f"{p['solver_status']}, {p['iterations']} it.",
-                f"{1e3 * p['solve_time_s']:.1f}",
-                f"{1e3 * p['check_time_s']:.1f}",
+                _milliseconds(p["solve_time_s"]),
+                _milliseconds(p["check_time_s"]),
             )
         )
     widths = [max(len(row[k]) for row in table) for k in range(len(head))]
-    numbers = {0, 3, 4, 5, 7, 8}
+    numbers = {0, 3, 4, 5, 6, 8, 9}
     lines = [
         "  ".join(c.rjust(widths[k]) if k in numbers else c.ljust(widths[k]) for k, c in enumerate(row))
         for row in table
@@ -147,8 +163,12 @@ def fixed(value: float | None) -> str:
     return "-" if value is None else f"{round(value, 2) + 0.0:.2f}"  # no -0.00
 
 
-def _times(seconds: dict[str, float]) -> str:
-    parts = {name: 1e3 * value for name, value in seconds.items()}
+def _milliseconds(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.1f}"
+
+
+def _times(seconds: dict[str, float | None]) -> str:
+    parts = {name: 1e3 * value for name, value in seconds.items() if value is not None}
     inner = [f"{name} {parts.pop(name):.1f}" for name in ("build", "solve", "check") if name in parts]
     outer = [f"{name} {value:.0f}" for name, value in parts.items() if name != "search"]
     whole = f"search {parts['search']:.1f}" if "search" in parts else ""

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from repair.arrays import Array, frozen
-from repair.errors import ConfigError, ScenarioError
+from repair.errors import ConfigError, ScenarioError, kind_of, path_of
 from repair.scene.frame import FrenetFrame
 from repair.scene.lead_in import drive_path
+from repair.scene.reading import read_file, require_commonroad
 from repair.scene.road.bounds import crossings, lateral_bounds
 from repair.scene.road.goal import goal_areas
 from repair.scene.road.lanes import Lane, lanes_of
@@ -24,6 +25,7 @@ from repair.scene.settings import SceneConfig
 from repair.scene.speed_signs import speed_limit_along
 from repair.scene.start import first_step_of, initial_state_of, is_ego
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
+from repair.settings import keys_of, require_type
 from repair.timegrid import steps_until
 from repair.vehicle.model import vehicle_model
 
@@ -67,14 +69,17 @@ def load_scene(
     ConfigError
         If a setting has an impossible value.
     """
-    from repair.scene.reading import read_file
-
     asked = {
         "planning_problem": planning_problem, "vehicle": vehicle, "horizon": horizon,
         "after_prediction": after_prediction, "smoothing": smoothing,
     }  # fmt: skip
     settings = _settings(config, asked)
-    contents = read_file(Path(path))
+    if hasattr(path, "lanelet_network"):
+        raise ScenarioError(
+            "a CommonRoad scenario is given where the path of a file is expected; "
+            "repair.scene_from_scenario(scenario, planning_problem) makes a scene of it"
+        )
+    contents = read_file(path_of(path, "a scenario file", ScenarioError))
     try:
         problem, note = _select(contents.problems, settings.planning_problem)
         scene = _quiet(contents.scenario, problem, settings)
@@ -96,7 +101,12 @@ def _settings(config: Any, asked: Mapping[str, Any]) -> SceneConfig:
         section = SceneConfig()
     if not isinstance(section, SceneConfig):
         raise ConfigError(f"a scene is loaded with a configuration, not with {type(config).__name__}")
-    return replace(section, **{key: value for key, value in asked.items() if value is not None})
+    laid = {key: value for key, value in asked.items() if value is not None}
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in laid.items()}
+    settings = replace(section, **plain)
+    for key in keys_of(SceneConfig, "scene."):
+        require_type(key, getattr(settings, key.name.removeprefix("scene.")))
+    return settings
 
 
 def _select(problems: Mapping[int, Any], wanted: int | None) -> tuple[Any, tuple[str, ...]]:
@@ -121,11 +131,34 @@ def scene_from_scenario(
     after_prediction: str | None = None,
     smoothing: float | None = None,
 ) -> Scene:
-    """Make a scene of a CommonRoad scenario and planning problem in memory; see :func:`load_scene`."""
+    """Make a scene of a CommonRoad scenario and planning problem in memory; see :func:`load_scene`.
+
+    Raises
+    ------
+    ScenarioError
+        If they are of another kind, or lack what planning needs.
+    ConfigError
+        If a setting has an impossible value.
+    """
     asked = {
         "vehicle": vehicle, "horizon": horizon, "after_prediction": after_prediction, "smoothing": smoothing,
     }  # fmt: skip
-    return _quiet(scenario, planning_problem, _settings(config, asked))
+    settings = _settings(config, asked)
+    _require_objects(scenario, planning_problem)
+    return _quiet(scenario, planning_problem, settings)
+
+
+def _require_objects(scenario: Any, problem: Any) -> None:
+    """Refuse what is no CommonRoad scenario, or no planning problem of one."""
+    require_commonroad()
+    if not all(hasattr(scenario, name) for name in ("dt", "lanelet_network", "dynamic_obstacles")):
+        raise ScenarioError(f"a CommonRoad scenario is expected, not {kind_of(scenario)}")
+    if hasattr(problem, "planning_problem_dict"):
+        raise ScenarioError(
+            "a single planning problem is expected, not a set; planning_problem_dict has them"
+        )
+    if not all(hasattr(problem, name) for name in ("initial_state", "goal", "planning_problem_id")):
+        raise ScenarioError(f"a CommonRoad planning problem is expected, not {kind_of(problem)}")
 
 
 def _quiet(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:

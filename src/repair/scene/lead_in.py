@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repair.arrays import Array
+from repair.arrays import Array, wrap
 from repair.errors import ScenarioError
 from repair.scene.frame import FrenetFrame
 from repair.vehicle.parameters import Vehicle
@@ -118,10 +118,10 @@ def _turn_in(frame: FrenetFrame, pose: Array, limit: float) -> Array:
         s = frame.to_frenet(np.array([[x, y]]))[0, 0]
         if not np.isfinite(s):
             break
-        if len(poses) > 1 and abs(_wrapped(heading - float(frame.heading(s)))) < 0.3:
+        if len(poses) > 1 and abs(wrap(heading - float(frame.heading(s)))) < 0.3:
             return np.array(poses)
         target = frame.position(s + ahead) - np.array([x, y])
-        alpha = _wrapped(np.arctan2(target[1], target[0]) - heading)
+        alpha = wrap(np.arctan2(target[1], target[0]) - heading)
         wanted = np.clip(2.0 * np.sin(alpha) / np.hypot(*target), -limit, limit)
         if abs(alpha) > np.pi / 2:
             wanted = np.copysign(limit, alpha)
@@ -129,10 +129,6 @@ def _turn_in(frame: FrenetFrame, pose: Array, limit: float) -> Array:
         middle = heading + kappa * step / 2
         poses.append(np.array([x + step * np.cos(middle), y + step * np.sin(middle), heading + kappa * step]))
     raise ScenarioError("no drivable path leads from the ego's initial pose onto its route")
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def drive_path(
@@ -177,7 +173,7 @@ def drive_path(
         raise ScenarioError("the ego's initial position cannot be projected on its route")
     curvature = float(np.clip(frame.curvature(s0) / (1.0 - frame.curvature(s0) * l0), -limit, limit))
     direction = orientation + vehicle.steady_slip(curvature)
-    error = _wrapped(direction - float(frame.heading(s0)))
+    error = wrap(direction - float(frame.heading(s0)))
     turn: Array = np.empty((0, 2))
     if abs(error) > _STEEP:
         notes.append(
@@ -187,7 +183,7 @@ def drive_path(
         turn = poses[:-1, :2]
         curvature = (poses[-1, 2] - poses[-2, 2]) / 0.25
         s1, l1 = frame.to_frenet(poses[-1:, :2])[0]
-        error = _wrapped(poses[-1, 2] - float(frame.heading(s1)))
+        error = wrap(poses[-1, 2] - float(frame.heading(s1)))
     else:
         s1, l1 = s0, l0
     start = _start_offsets(frame, s1, l1, error, curvature)

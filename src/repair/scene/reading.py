@@ -6,14 +6,16 @@ import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from repair.errors import ScenarioError
+from repair.errors import RepairError, ScenarioError, in_words
 
-__all__ = ["FileContents", "read_file", "read_solution", "read_xml"]
+__all__ = ["FileContents", "read_file", "read_solution", "read_xml", "require_commonroad"]
 
 _SIZE_MAX = 200_000_000  # bytes
 _TIME_STEP = (1e-3, 10.0)  # smallest and largest [s]
@@ -22,6 +24,8 @@ _NEEDED = {
     "dynamicObstacle": ("position", "orientation", "velocity", "time"),
     "staticObstacle": ("position", "orientation"),
 }
+#: The first release of commonroad-io that lacks what the drivability checker imports.
+_COMMONROAD_END = 2026
 _KNOWN = frozenset(
     {"location", "scenarioTags", "lanelet", "trafficSign", "trafficLight", "intersection", "obstacle",
      "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem"}
@@ -40,6 +44,37 @@ class FileContents:
     notes: tuple[str, ...] = ()
 
 
+@lru_cache(maxsize=1)
+def require_commonroad() -> None:
+    """See that CommonRoad's packages fit each other; looked at once in a process.
+
+    Raises
+    ------
+    RepairError
+        If they are not there, or commonroad-io is one that the drivability checker cannot be used with;
+        the sentence says what to install.
+    """
+    install = f"install one that fits: pip install 'commonroad-io>=2024.3,<{_COMMONROAD_END}'"
+    try:
+        found = version("commonroad-io")
+    except PackageNotFoundError:
+        found = ""  # not installed as a package; the import decides
+    year = found.partition(".")[0]
+    if year.isdigit() and int(year) >= _COMMONROAD_END:
+        raise RepairError(
+            f"commonroad-io {found} is installed, and the drivability checker cannot be used with it; "
+            f"{install}"
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # protobuf's
+            import commonroad.common.file_reader
+            import commonroad.geometry.shape  # noqa: F401  # what 2026.1 removed
+    except ImportError as error:
+        shown = f"commonroad-io {found or 'of unknown version'} lacks what is needed ({in_words(error)})"
+        raise RepairError(f"{shown}; {install}") from error
+
+
 class _Stop(Exception):
     """The root element is reached: the prolog is clean."""
 
@@ -56,6 +91,8 @@ def _bytes(path: Path, limit: int) -> bytes:
         data = path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"{path} cannot be read: {error.strerror or error}") from error
+    except ValueError as error:  # a null character in the name, or one that the file system cannot spell
+        raise ScenarioError(f"{str(path)!r} is not the name of a file: {error}") from error
     if not data.strip():
         raise ScenarioError(f"{path.name} is empty")
     return data
@@ -118,9 +155,10 @@ def read_file(path: Path, *, size_limit: int = _SIZE_MAX) -> FileContents:
     _check_time_step(attributes.get("timeStepSize"), path.name)
     notes = _check_elements(data, path.name)
 
+    require_commonroad()
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # commonroad-io's, about the file, and protobuf's, when imported
+            warnings.simplefilter("ignore")  # commonroad-io's, about the file
             from commonroad.common.file_reader import CommonRoadFileReader
             from commonroad.common.util import FileFormat
 
@@ -148,9 +186,10 @@ def read_solution(path: Path) -> Any:
     ScenarioError
         Whatever is wrong with it, in one sentence that names the file.
     """
+    data = read_xml(path)[0]
+    require_commonroad()
     from commonroad.common.solution import CommonRoadSolutionReader
 
-    data = read_xml(path)[0]
     try:
         return CommonRoadSolutionReader.fromstring(data)
     except Exception as error:  # as above

@@ -18,11 +18,16 @@ if TYPE_CHECKING:
 __all__ = ["as_ego", "reframe"]
 
 _SPACING = 0.5  # recorded points closer than this [m] are noise to a path
+_JOIN_TURN = 0.4  # a path that heads elsewhere by more than this [rad] goes straight on
+_JOIN_SLOPE = 5.0  # so many metres for each metre that it lies beside the route, if that is longer
 _JOIN = 15.0  # length over which the recorded path runs into the route again [m]
 
 
 def reframe(scene: Scene, positions: Array) -> Scene:
     """Lay the frame along recorded centre positions (T, 2), then on along the old frame.
+
+    Where the recording ends across the route or against it, the frame goes straight on instead: a path back
+    to the route would fold, and places on it would have two coordinates.
 
     A reference that changes lanes then has l = 0 like any other, so that it can be followed more
     slowly without leaving its path.
@@ -42,13 +47,13 @@ def reframe(scene: Scene, positions: Array) -> Scene:
         return scene
     old = scene.frame
     s_end, l_end = old.to_frenet(recorded[-1:])[0]
-    if np.isfinite(s_end):
+    direction = recorded[-1] - recorded[-2]
+    if np.isfinite(s_end) and abs(_turn(direction, float(old.heading(s_end)))) < _JOIN_TURN:
         ahead = np.arange(_SPACING, max(old.length - s_end, _SPACING * 2), 1.0)
-        share = np.clip(ahead / _JOIN, 0.0, 1.0)
+        share = np.clip(ahead / max(_JOIN, _JOIN_SLOPE * abs(l_end)), 0.0, 1.0)
         offset = l_end * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
         following = old.to_cartesian(s_end + ahead, offset)
-    else:
-        direction = recorded[-1] - recorded[-2]
+    else:  # it drives where the route does not go, and a path back to it would fold
         following = recorded[-1] + np.arange(1.0, 40.0)[:, None] * direction / np.hypot(*direction)
     direction = recorded[1] - recorded[0]
     back = np.arange(30.0, 0.0, -1.0)[:, None]
@@ -71,6 +76,11 @@ def reframe(scene: Scene, positions: Array) -> Scene:
         speed_limit=None,
         notes=(*scene.notes, "the frame runs along the recorded reference"),
     )
+
+
+def _turn(direction: Array, heading: float) -> float:
+    """Angle from a heading to a direction (2,) [rad]."""
+    return float((np.arctan2(direction[1], direction[0]) - heading + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def as_ego(scene: Scene, obstacle_id: int) -> Scene:

@@ -27,8 +27,8 @@ class SceneConfig:
         0.15, "how far smoothing may move the route's centre line [m]", low=1e-4, high=10.0
     )
     s_offset: float | None = setting(
-        None, "S_offset [m]; null: half the vehicle's length + 0.1", low=0.0, high=100.0
+        None, "S_offset [m]; null: half the vehicle's length + checker.clearance + 0.1", low=0.0, high=100.0
     )
     l_offset: float | None = setting(
-        None, "L_offset [m]; null: half the vehicle's width + 0.1", low=0.0, high=100.0
+        None, "L_offset [m]; null: half the vehicle's width + checker.clearance + 0.1", low=0.0, high=100.0
     )

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from repair.backend.base import RepairBackend, SolveResult, SolveStatus
 from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve
+from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
 from repair.search.result import Probe
 
-__all__ = ["Budget", "OutOfTime", "ProblemSource", "TrajectoryChecker", "probe_sides"]
+__all__ = ["Budget", "ProblemSource", "TrajectoryChecker", "probe_sides"]
 
 
 class ProblemSource(Protocol):
@@ -26,6 +29,10 @@ class ProblemSource(Protocol):
         """The problems again with smaller and smaller margins, for backends that keep theirs."""
         ...
 
+    def widened(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
+        """The problems again with larger and larger margins, for curves that came too close."""
+        ...
+
 
 class TrajectoryChecker(Protocol):
     """Judges a repaired curve; the same for every backend."""
@@ -33,10 +40,6 @@ class TrajectoryChecker(Protocol):
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
         """Verdict on the reference until t_rep followed by ``curve``."""
         ...
-
-
-class OutOfTime(Exception):
-    """Ours alone: a TimeoutError may come out of a backend, and would be its bug."""
 
 
 @dataclass
@@ -58,6 +61,13 @@ class Budget:
         """Nothing is left."""
         return self.left == 0.0
 
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """The deadline of whatever is done inside of a ``with`` block."""
+        left = self.left
+        with until(None if left is None else time.perf_counter() + left):
+            yield
+
 
 def probe_sides(
     t_rep: float,
@@ -75,20 +85,19 @@ def probe_sides(
         if tried and budget.spent:
             budget.cut = True
             break
-        solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+        try:
+            solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+        except OutOfTime as late:  # of something in it that looks at the deadline
+            solve = SolveResult(SolveStatus.TIME_LIMIT, detail=str(late))
         budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
         begin = budget.clock()
-        verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
-        margin = problem.margin
-        closest = solve.closest
-        if solve.curve is None and closest is not None and not problem.strict:
-            # The backend calls this infeasible, and so it stays; but boxes are wider than vehicles, and
-            # the checker may accept the curve that comes closest.
-            again = checker.check(problem, closest.curve)
-            if again.ok:
-                margin -= closest.miss
-                detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
-                solve, verdict = replace(solve, curve=closest.curve, detail=detail), again
+        try:
+            solve, verdict, margin = _judged(problem, solve, checker, t_rep)
+        except OutOfTime:  # a curve that nobody has judged is none
+            budget.cut, margin = True, problem.margin
+            detail = "a curve was found, and no time was left to judge it"
+            solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
+            verdict = _unsolved(solve, t_rep)
         maneuver = problem.passing.maneuver if problem.passing is not None else None
         name = maneuver.value if maneuver is not None else "follow"
         tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
@@ -102,6 +111,24 @@ def probe_sides(
         why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
         return Probe(t_rep, nothing, Verdict((why,)))
     return Probe(t_rep, best.solve, best.verdict, best.maneuver, best.check_time, tuple(tried), best.margin)
+
+
+def _judged(
+    problem: RepairProblem, solve: SolveResult, checker: TrajectoryChecker, t_rep: float
+) -> tuple[SolveResult, Verdict, float]:
+    """What a backend found, what the checker says of it, and the margin it keeps [m]."""
+    verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
+    margin = problem.margin
+    closest = solve.closest
+    if solve.curve is None and closest is not None and not problem.strict:
+        # The backend calls this infeasible, and so it stays; but boxes are wider than vehicles, and
+        # the checker may accept the curve that comes closest.
+        again = checker.check(problem, closest.curve)
+        if again.ok:
+            margin -= closest.miss
+            detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
+            solve, verdict = replace(solve, curve=closest.curve, detail=detail), again
+    return solve, verdict, margin
 
 
 def _better(new: Probe, old: Probe) -> bool:

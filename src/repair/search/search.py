@@ -7,15 +7,17 @@ produce the iterates that the paper reports; rule ``as_printed`` visits what it 
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from repair.backend.base import RepairBackend
-from repair.check.verdict import Conflict
+from repair.check.verdict import Conflict, Reason
 from repair.curves.base import Curve
+from repair.deadline import OutOfTime
 from repair.problem.problem import RepairProblem
-from repair.search.probe import Budget, OutOfTime, ProblemSource, TrajectoryChecker, probe_sides
+from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_sides
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import Order, probe_order
 from repair.search.settings import SearchConfig
@@ -47,7 +49,11 @@ def iter_probes(
     def is_open(t_rep: float) -> bool:
         if budget.spent:
             return False
-        made[t_rep] = source.at(t_rep)
+        try:
+            with budget.watched():
+                made[t_rep] = source.at(t_rep)
+        except OutOfTime:
+            return False
         return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
 
     given = None if visits is None else _given(visits)
@@ -61,26 +67,56 @@ def iter_probes(
             return
         if budget.spent:
             raise OutOfTime
-        budget.cut = False
-        first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
-        probe = probe_sides(t_rep, first, backend, checker, settings.sides, warm_start, budget)
-        # Boxes in (s, l) are wider than the vehicles in them; a hard backend would call a repair infeasible
-        # that the checker, which looks at the true rectangles, accepts.
-        for problems in source.relaxed(t_rep) if backend.capabilities.relaxes else ():
-            if probe.feasible:
-                break
-            if budget.spent:
-                budget.cut = True
-                break
-            again = probe_sides(t_rep, problems, backend, checker, settings.sides, warm_start, budget)
-            tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
-            probe = replace(again if again.feasible else probe, tried=tried)
+        with budget.watched():
+            first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
+            probe = _visit(t_rep, first, source, backend, checker, settings.sides, warm_start, budget)
         if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
         answer = probe.feasible
         yield probe
         if budget.cut and not answer:
             raise OutOfTime  # nobody knows whether it would have been feasible
+
+
+def _visit(
+    t_rep: float,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    warm_start: Curve | None,
+    budget: Budget,
+) -> Probe:
+    """One t_rep, with its first problems and then with other margins."""
+    budget.cut = False
+    probe = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
+    others = []
+    # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow: a curve that keeps out of
+    # the boxes is rejected by the checker, which looks at the true rectangles. Beside one that turns they
+    # are too wide: a hard backend would call a repair infeasible that the checker accepts.
+    if _too_close(probe):
+        others.append(source.widened)
+    if backend.capabilities.relaxes:
+        others.append(source.relaxed)
+    try:
+        for problems in itertools.chain.from_iterable(again(t_rep) for again in others):
+            if probe.feasible:
+                break
+            if budget.spent:
+                budget.cut = True
+                break
+            again = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
+            tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
+            probe = replace(again if again.feasible else probe, tried=tried)
+    except OutOfTime:  # while the next problems were made
+        budget.cut = True
+    return probe
+
+
+def _too_close(probe: Probe) -> bool:
+    near = (Reason.COLLISION, Reason.MARGIN)
+    return any(violation.reason in near for violation in probe.verdict.violations)
 
 
 def _given(visits: Sequence[float]) -> Order:

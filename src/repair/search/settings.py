@@ -25,7 +25,12 @@ class SearchConfig:
     upper: float | None = setting(
         None, "upper end [s]; null: TTC", low=0.0, high=1e3, only_with=("driver", ("f_ttr",))
     )
-    time_limit: float | None = setting(None, "whole search [s]", low=0.0, high=1e6)
+    time_limit: float | None = setting(
+        None,
+        "of the search alone [s]; what is found by then is the answer, load and preparation are in time_s",
+        low=0.0,
+        high=1e6,
+    )
     sides: str = setting(
         "best",
         "best: every open side of passing is tried; first: the first feasible one",

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from repair.config import load_config
-from repair.errors import RepairError
+from repair.errors import RepairError, in_words
 from repair.study.rows import SweepSettings, combinations, failed_row
 from repair.study.task import run_file
 
-__all__ = ["sweep"]
+__all__ = ["require_settings", "sweep"]
 
 
 # -- workers ---------------------------------------------------------------------------------------
@@ -71,6 +71,25 @@ class _Worker:
             self.process.join(5.0)
 
 
+def require_settings(settings: SweepSettings) -> None:
+    """See that every backend can be made, every reference is known, and there is somebody to do the work.
+
+    Raises
+    ------
+    RepairError
+        Naming what is wrong.
+    """
+    from repair.solvers.registry import make_backend
+
+    if not settings.jobs >= 1:
+        raise RepairError(f"jobs is {settings.jobs}; a sweep takes at least one worker process")
+    if not settings.timeout > 0.0:
+        raise RepairError(f"timeout is {settings.timeout:g} s; it has to be positive")
+    for backend, reference in combinations(settings):
+        overrides = [*settings.overrides, f"reference.source={reference}"]
+        make_backend(backend, load_config(settings.preset, overrides=overrides, backend=backend))
+
+
 def sweep(folder: Path, settings: SweepSettings, *, progress: bool | None = None) -> list[dict[str, Any]]:
     """Run over all ``*.xml`` files of a folder.
 
@@ -89,16 +108,19 @@ def sweep(folder: Path, settings: SweepSettings, *, progress: bool | None = None
     Raises
     ------
     RepairError
-        If the folder has no scenario files.
+        If the folder has no scenario files, or the settings ask for what there is not: before any work.
     """
-    files = sorted(folder.glob("*.xml")) if folder.is_dir() else []
+    require_settings(settings)
+    try:
+        files = sorted(folder.glob("*.xml")) if folder.is_dir() else []
+    except (OSError, ValueError) as error:
+        raise RepairError(f"the folder {folder} cannot be read: {in_words(error)}") from error
     if not files:
         raise RepairError(f"{folder} is not a folder with CommonRoad scenario files (*.xml)")
     from tqdm import tqdm
 
-    load_config(settings.preset, overrides=settings.overrides)
     rows: list[list[dict[str, Any]]] = [[] for _ in files]
-    workers = [_Worker(settings) for _ in range(max(1, settings.jobs))]
+    workers = [_Worker(settings) for _ in range(settings.jobs)]
     waiting = iter(range(len(files)))
     shown = sys.stderr.isatty() if progress is None else progress
     with tqdm(total=len(files), disable=not shown, unit="file", leave=False) as bar:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import json
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,5 @@ def write_sweep(
         "files": {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in sorted(source.glob("*.xml"))},
         "rows": rows,
     }
-    json.dumps(content, allow_nan=False)
-    return write_files(
-        folder, {"sweep.csv": table.getvalue().encode(), "sweep.json": to_json(content).encode()}
-    )
+    rows_text = table.getvalue().encode("utf-8", "backslashreplace")
+    return write_files(folder, {"sweep.csv": rows_text, "sweep.json": to_json(content).encode()})

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from repair.config import load_config
-from repair.errors import RepairError
+from repair.errors import BackendError, RepairError
 from repair.study.rows import COLUMNS, SweepSettings, combinations, failed_row, one_line
 
 
@@ -19,10 +19,7 @@ def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
     begin = time.perf_counter()
     try:
         config = load_config(settings.preset, overrides=settings.overrides)
-        scene = load_scene(
-            path,
-            config,
-        )
+        scene = load_scene(path, config)
     except RepairError as error:
         return [
             failed_row(path.name, b, r, "input_error", one_line(error)) for b, r in combinations(settings)
@@ -33,7 +30,10 @@ def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
         try:
             rows.append(_row(path.name, scene, backend, reference, settings, loaded))
         except RepairError as error:
-            rows.append(failed_row(path.name, backend, reference, "input_error", one_line(error)))
+            # What a backend's own failure is reported as is no fault of the input.
+            broken = isinstance(error, BackendError) and isinstance(error.__cause__, Exception)
+            status = "crash" if broken else "input_error"
+            rows.append(failed_row(path.name, backend, reference, status, one_line(error)))
         except Exception as error:
             detail = f"{type(error).__name__}: {one_line(error)}"
             rows.append(failed_row(path.name, backend, reference, "crash", detail))
@@ -66,6 +66,7 @@ def _row(
         reference=reference,
         detail=_why(failing) if failing is not None else "",
         conflict=content["conflict"]["kind"],
+        margin_only=content["conflict"]["margin_only"],
         obstacle_id=content["conflict"]["obstacle_id"],
         from_behind=content["conflict"]["from_behind"],
         ttb_s=_text(evasive.ttb),

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from repair.deadline import OutOfTime, in_time, limited
+
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
     from repair.vehicle.states import DrivenStates
 
-__all__ = ["OfficialReport", "official_check", "to_ks_states"]
+__all__ = ["OfficialReport", "load_official", "official_check", "to_ks_states"]
+
+_OFFICIAL = "commonroad_dc.feasibility.feasibility_checker"
+_IMPORT = 0.5  # what importing it takes at most [s]
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,15 @@ class OfficialReport:
     transitions: npt.NDArray[np.intp]
     ok: npt.NDArray[np.bool_]
     reasons: dict[int, str]
+
+
+def load_official() -> None:
+    """Import the drivability checker: once in the life of a process that takes longer than many a search.
+
+    Where that cannot be done, whoever needs it will say so.
+    """
+    with suppress(ImportError):
+        import commonroad_dc.feasibility.feasibility_checker  # noqa: F401
 
 
 def official_check(
@@ -54,16 +70,33 @@ def official_check(
     -------
     OfficialReport
         An exception inside the drivability checker is a "no" with its message as the reason.
+
+    Raises
+    ------
+    repair.deadline.OutOfTime
+        If the deadline passes before; its optimiser is stopped between two of its attempts.
     """
+    if _OFFICIAL not in sys.modules:
+        in_time(_IMPORT, "importing the drivability checker")
     from commonroad.common.solution import VehicleType
-    from commonroad_dc.feasibility.feasibility_checker import state_transition_feasibility
+    from commonroad_dc.feasibility.feasibility_checker import (
+        position_orientation_objective,
+        state_transition_feasibility,
+    )
     from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 
     asked = np.arange(len(states) - 1) if transitions is None else np.array(list(transitions), dtype=np.intp)
     ks = to_ks_states(states, 0)
     dynamics = VehicleDynamics.KS(VehicleType(vehicle.type_id))
     reasons: dict[int, str] = {}
+
+    def timed(*values: Any) -> float:
+        in_time()
+        return float(position_orientation_objective(*values))
+
+    objective = timed if limited() else position_orientation_objective
     for i in asked.tolist():
+        in_time()
         values = [
             (s.position[0], s.position[1], s.steering_angle, s.velocity, s.orientation) for s in ks[i : i + 2]
         ]
@@ -73,9 +106,11 @@ def official_check(
         try:
             with warnings.catch_warnings():  # of its integrator and optimiser, about inputs they only try
                 warnings.simplefilter("ignore")
-                feasible, _ = state_transition_feasibility(ks[i], ks[i + 1], dynamics, dt)
+                feasible, _ = state_transition_feasibility(ks[i], ks[i + 1], dynamics, dt, objective)
         except Exception as error:  # the checker wraps whatever happens into a bare Exception
             cause = error.__cause__ or error
+            if isinstance(cause, OutOfTime):
+                raise cause from None
             reasons[i] = f"drivability checker: {type(cause).__name__}: {cause}"
             continue
         if not feasible:

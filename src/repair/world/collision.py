@@ -20,23 +20,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, Points
+from repair.arrays import Array, Points, wrap
+from repair.deadline import in_time
 from repair.world.advance import Motions, first_touch
 from repair.world.polygons import first_polygon_touch
+from repair.world.table import TrackTable
 from repair.world.touching import CLOCKWISE, TOUCH, rectangles_touch
-from repair.world.tracks import (
-    AFTER,
-    BEFORE,
-    INSTANT,
-    MOVING,
-    POLYGON,
-    RECTANGLE,
-    Index,
-    Track,
-    as_complex,
-    block_samples,
-    tracks_of,
-)
+from repair.world.tracks import AFTER, BEFORE, INSTANT, POLYGON, RECTANGLE, Index, as_complex
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
@@ -44,8 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CollisionWorld", "Contact"]
 
-# Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
-_SPARE = 1e-3
 # A straight line between two samples a time h apart is off by an eighth of h**2 times the acceleration, and
 # that is at most twice what the second differences around the interval say.
 _BULGE = 2.0 / 8.0
@@ -65,6 +53,15 @@ class _Hit(NamedTuple):
     time: float
     sample: int
     obstacle: int
+
+
+class _Asked(NamedTuple):
+    """What is asked about: margin (along and across), obstacles beside the ego, from when on, and how."""
+
+    margin: complex
+    beside: frozenset[int]
+    since: int
+    all_pairs: bool
 
 
 class CollisionWorld:
@@ -105,57 +102,7 @@ class CollisionWorld:
         self._half, self._radius = complex(vehicle.half_length, vehicle.half_width), vehicle.radius
         self._diagonal = np.array(self._half)  # an array for the reason that CLOCKWISE is one
         self._sides = np.array((vehicle.half_length, vehicle.half_width))
-        self._tracks: list[Track] = []
-        self._owner: list[int] = []
-        for index, obstacle in enumerate(self._obstacles):
-            for track in tracks_of(obstacle, self.n_samples, substeps):
-                self._tracks.append(track)
-                self._owner.append(index)
-        self._build()
-
-    def _build(self) -> None:
-        """Tabulate every shape's pose, its reach, and how far it moves half way to the next sample.
-
-        Columns are tracks. Circles and polygons have the size of their circumcircle.
-        """
-        tracks = self._tracks
-        stacked = np.stack([t.rows for t in tracks], axis=1) if tracks else np.empty((self.n_samples, 0, 5))
-        self._kind = np.array([t.kind for t in tracks], dtype=np.intp)
-        self._mode = np.array([t.mode for t in tracks], dtype=np.intp)
-        x, y, heading, *size = np.moveaxis(stacked, 2, 0)
-        # Points and directions of the plane as complex numbers: one call where coordinates take two.
-        centre = as_complex(x, y)
-        axis = as_complex(np.cos(heading), np.sin(heading))
-        # (3, samples * tracks): centre, and from there to two corners
-        diagonal = as_complex(*size)
-        self._shapes = np.stack((centre, axis * diagonal, axis * diagonal.conj())).reshape(3, -1)
-        self._axis, self._size, self._heading = axis.ravel(), diagonal.ravel(), heading.ravel()
-        rectangle = self._kind == RECTANGLE
-        radius = np.where(rectangle, np.hypot(*size), size[0])
-        self._round = bool((~rectangle).any())
-        turned = np.abs(_wrapped(np.diff(heading, axis=0))) * np.where(rectangle, np.hypot(*size), 0.0)[1:]
-        grown = np.maximum(np.abs(np.diff(size[0], axis=0)), np.abs(np.diff(size[1], axis=0)))
-        moved = np.nan_to_num(0.5 * (np.abs(np.diff(centre, axis=0)) + turned + grown))
-        moved[:, self._mode != MOVING] = 0.0
-        none = np.zeros((1, len(tracks)))
-        slack = np.maximum(np.concatenate((none, moved)), np.concatenate((moved, none)))
-        self._slack = slack.ravel()
-        # How much of the ego's way to its neighbours a sample answers for; held shapes change at a step.
-        self._share = np.array([1.0, 1.0, 1.0, 0.0])[self._mode] * np.where(self._mode == MOVING, 0.5, 1.0)
-        self._build_blocks(centre, radius + slack + self._radius)
-
-    def _build_blocks(self, centre: Points, reach: Array) -> None:
-        """A circle around each track over each block of samples, what the ego needs included."""
-        size = self._block = 2 * self.substeps
-        count = -(-self.n_samples // size)
-        padded = np.full((3, count * size, len(self._kind)), np.nan)
-        padded[:, : self.n_samples] = centre.real, centre.imag, reach
-        x, y, padded_reach = padded.reshape(3, count, size, -1)
-        # fmin and fmax pass over the samples at which an obstacle is not there
-        middle = [0.5 * (np.fmin.reduce(v, axis=1) + np.fmax.reduce(v, axis=1)) for v in (x, y)]
-        self._block_centre = as_complex(*middle)
-        away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
-        self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
+        self._table = TrackTable(self._obstacles, self.n_samples, substeps, self._radius)
 
     def contact(self, x: Array, y: Array, orientation: Array, start: int = 0) -> Contact | None:
         """First contact of the ego's rectangle with an obstacle.
@@ -187,9 +134,12 @@ class CollisionWorld:
         start: int = 0,
         step: float | None = None,
         *,
+        margin: float = 0.0,
+        beside: frozenset[int] = frozenset(),
+        since: int = 0,
         all_pairs: bool = False,
     ) -> Contact | None:
-        """As :meth:`contact`, of centres that are complex numbers already.
+        """As :meth:`contact`, of centres that are complex numbers already, and with a safety margin.
 
         Parameters
         ----------
@@ -199,11 +149,18 @@ class CollisionWorld:
             As in :meth:`contact`.
         step : float, optional
             The longest way from one sample to the next [m], if it is known.
+        margin : float
+            By how much the ego's rectangle is enlarged on every side [m].
+        beside : frozenset of int
+            Obstacles, by index, that do not count until the enlarged ego has been clear of them.
+        since : int
+            Sample, counted from the first one, from which on contacts count.
         all_pairs : bool
             Hold everything against everything, without the looks that mostly settle it. This is slow, and the
             definition of what those looks must find.
         """
-        found = self._first(here, orientation, start, step, all_pairs)
+        asked = _Asked(margin * (1 + 1j), beside, since, all_pairs)
+        found = self._first(here, orientation, start, step, asked)
         if found is None:
             return None
         k = found.sample
@@ -236,7 +193,7 @@ class CollisionWorld:
         return centre, velocity
 
     def _first(
-        self, here: Points, orientation: Array, start: int, step: float | None, all_pairs: bool
+        self, here: Points, orientation: Array, start: int, step: float | None, asked: _Asked
     ) -> _Hit | None:
         stop = start + len(here)
         if start < 0 or stop > self.n_samples:
@@ -250,57 +207,109 @@ class CollisionWorld:
         ways = np.abs(here[1:] - here[:-1])
         if step is None:
             step = float(ways.max(initial=0.0))
-        ego, row = self._everything(len(here), start) if all_pairs else self._near(here, start, step)
+        if asked.all_pairs:
+            ego, row = self._table.everything(len(here), start)
+        else:
+            ego, row = self._table.near(here, start, step, asked.margin)
+        if asked.since or asked.beside:
+            counted = ego >= self._counting(here, orientation, start, asked)[row % len(self._table.kind)]
+            ego, row = ego[counted], row[counted]
         if not len(ego):
             return None
         spare = _bulges(here, orientation, self._radius)
-        if not all_pairs:
-            chosen = self._unsettled(here, orientation, ways, spare, ego, row)
+        if not asked.all_pairs:
+            chosen = self._unsettled(here, orientation, ways, spare, ego, row, asked.margin)
             if not np.count_nonzero(chosen):
                 return None
             ego, row = ego[chosen], row[chosen]
-        return self._closely(here, orientation, start, spare, ego, row)
+        return self._closely(here, orientation, start, spare, ego, row, asked)
+
+    def _counting(self, here: Points, orientation: Array, start: int, asked: _Asked) -> Index:
+        """Sample from which on each track counts: when the ego has been clear of those that it is beside."""
+        since = np.full(len(self._table.kind), asked.since, dtype=np.intp)
+        for m in (m for m, owner in enumerate(self._table.owner) if owner in asked.beside):
+            ego = np.arange(len(here))
+            row = (ego + start) * len(self._table.kind) + m
+            still = np.zeros(len(here), dtype=np.bool_)
+            none = np.zeros(len(here) - 1)
+            still[:] = self._unsettled(here, orientation, none, none, ego, row, asked.margin, still=True)
+            left = np.flatnonzero(~still)
+            since[m] = max(asked.since, int(left[0]) if len(left) else len(here))
+        return since
+
+    def met_at(self, sample: int, centre: complex, orientation: float, margin: float) -> frozenset[int]:
+        """Obstacles, by index, that the ego enlarged by a margin [m] meets at a sample."""
+        here, turn = np.array([centre]), np.array([orientation])
+        tracks = np.arange(len(self._table.kind))
+        row = sample * len(self._table.kind) + tracks
+        none, ego = np.zeros(0), np.zeros(len(tracks), dtype=np.intp)
+        wide = margin * (1 + 1j)
+        near = self._unsettled(here, turn, none, none, ego, row, wide, still=True)
+        asked = _Asked(wide, frozenset(), 0, True)
+        return frozenset(
+            self._table.owner[m]
+            for m in np.flatnonzero(near).tolist()
+            if self._table.kind[m] != POLYGON
+            or self._closely(here, turn, sample, none, ego[:1], row[m : m + 1], asked) is not None
+        )
 
     def _unsettled(
-        self, here: Points, orientation: Array, ways: Array, spare: Array, ego: Index, row: Index
+        self,
+        here: Points,
+        orientation: Array,
+        ways: Array,
+        spare: Array,
+        ego: Index,
+        row: Index,
+        margin: complex,
+        *,
+        still: bool = False,
     ) -> npt.NDArray[np.bool_]:
-        """Which pairs of a sample and a shape may meet until half way to the samples around."""
-        ways = ways + self._radius * np.abs(_wrapped(np.diff(orientation))) + spare
-        reach = np.zeros(len(here))
-        reach[:-1] = ways
-        np.maximum(reach[1:], ways, out=reach[1:])
-        slack = reach.take(ego) * self._share.take(row % len(self._kind)) + self._slack.take(row)
+        """Which pairs of a sample and a shape may meet until half way to the samples around.
+
+        With ``still`` those that do at the sample itself; of polygons, their circumcircles.
+        """
+        table, slack = self._table, np.zeros(len(row))
+        if not still:
+            ways = ways + self._radius * np.abs(wrap(np.diff(orientation))) + spare
+            reach = np.zeros(len(here))
+            reach[:-1] = ways
+            np.maximum(reach[1:], ways, out=reach[1:])
+            slack = reach.take(ego) * table.share.take(row % len(table.kind)) + table.slack.take(row)
         axis = np.exp(orientation.take(ego) * CLOCKWISE)
-        shapes = self._shapes.take(row, axis=1)
+        shapes = table.shapes.take(row, axis=1)
         shapes[0] -= here.take(ego)
         shapes *= axis
-        size, around = self._size.take(row), shapes[0].copy() if self._round else None
-        hit = rectangles_touch(shapes, self._axis.take(row) * axis, self._diagonal, size, slack * (1 + 1j))
+        size, around = table.size.take(row), shapes[0].copy() if table.any_round else None
+        wide = self._diagonal + margin
+        hit = rectangles_touch(shapes, table.axis.take(row) * axis, wide, size, slack * (1 + 1j))
         if around is not None:
-            beyond = np.maximum(np.abs(around.view(np.float64).reshape(-1, 2)) - self._sides, 0.0)
+            sides = self._sides + np.array((margin.real, margin.imag))
+            beyond = np.maximum(np.abs(around.view(np.float64).reshape(-1, 2)) - sides, 0.0)
             round_hit = np.hypot(beyond[:, 0], beyond[:, 1]) <= size.real + TOUCH + slack
-            hit = np.where(self._kind[row % len(self._kind)] == RECTANGLE, hit, round_hit)
+            hit = np.where(table.kind[row % len(table.kind)] == RECTANGLE, hit, round_hit)
         return hit
 
     def _closely(
-        self, here: Points, orientation: Array, start: int, spare: Array, ego: Index, row: Index
-    ) -> _Hit | None:
+        self, here: Points, orientation: Array, start: int, spare: Array, ego: Index, row: Index,
+        asked: _Asked,
+    ) -> _Hit | None:  # fmt: skip
         """First contact of pairs of samples and shapes, until the samples around, by advancement."""
-        count, last = len(self._kind), len(here) - 1
+        count, last = len(self._table.kind), len(here) - 1
         m = row % count
         # Each pair as the two intervals beside it, and as the instant that it is.
-        first = np.concatenate((np.maximum(ego - 1, 0), ego, ego))
+        first = np.concatenate((np.maximum(ego - 1, asked.since), ego, ego))
         after = np.concatenate((ego, np.minimum(ego + 1, last), ego))
         track = np.concatenate((m, m, m))
-        kept = (self._mode[track] != INSTANT) | (first == after)
+        kept = (self._table.mode[track] != INSTANT) | (first == after)
         known = np.unique((first * (last + 1) + after)[kept] * count + track[kept])
         place, track = np.divmod(known, count)
         first, after = np.divmod(place, last + 1)
-        mode = self._mode[track]
+        mode = self._table.mode[track]
         begin = np.where(mode == AFTER, after, first)
         end = np.where(mode == BEFORE, first, after)
         rows, rows_end = (begin + start) * count + track, (end + start) * count + track
-        there = np.isfinite(self._heading[rows]) & np.isfinite(self._heading[rows_end])
+        there = np.isfinite(self._table.heading[rows]) & np.isfinite(self._table.heading[rows_end])
         if not there.any():
             return None
         first, after, track, rows, rows_end = (x[there] for x in (first, after, track, rows, rows_end))
@@ -308,48 +317,27 @@ class CollisionWorld:
         off = np.where(after > first, np.append(spare, 0.0)[first], 0.0)
         pairs = Motions(
             times[first], times[after], here[first], here[after], orientation[first],
-            orientation[first] + _wrapped(orientation[after] - orientation[first]),
-            self._shapes[0, rows], self._shapes[0, rows_end], self._heading[rows],
-            self._heading[rows] + _wrapped(self._heading[rows_end] - self._heading[rows]),
-            self._size[rows], self._size[rows_end], self._kind[track] != RECTANGLE, off,
+            orientation[first] + wrap(orientation[after] - orientation[first]),
+            self._table.shapes[0, rows], self._table.shapes[0, rows_end], self._table.heading[rows],
+            self._table.heading[rows] + wrap(self._table.heading[rows_end] - self._table.heading[rows]),
+            self._table.size[rows], self._table.size[rows_end], self._table.kind[track] != RECTANGLE, off,
         )  # fmt: skip
-        polygon = self._kind[track] == POLYGON
+        polygon = self._table.kind[track] == POLYGON
         found: list[_Hit] = []
         plain = np.flatnonzero(~polygon)
-        touch = first_touch(pairs.take(plain), self._half)
+        half = self._half + asked.margin
+        touch = first_touch(pairs.take(plain), half)
         if touch is not None:
             i = plain[touch[1]]
-            found.append(_Hit(touch[0], int(first[i]), self._owner[track[i]]))
+            found.append(_Hit(touch[0], int(first[i]), self._table.owner[track[i]]))
         for i in np.flatnonzero(polygon).tolist():
-            made = self._tracks[track[i]]
+            in_time()
+            made = self._table.tracks[track[i]]
             sample = start + int(after[i] if made.mode == AFTER else first[i])
-            time = first_polygon_touch(pairs, i, made.polygons[int(made.steps[sample])], self._half)
+            time = first_polygon_touch(pairs, i, made.polygons[int(made.steps[sample])], half)
             if time is not None:
-                found.append(_Hit(time, int(first[i]), self._owner[track[i]]))
+                found.append(_Hit(time, int(first[i]), self._table.owner[track[i]]))
         return min(found, default=None)
-
-    def _near(self, here: Points, start: int, step: float) -> tuple[Index, Index]:
-        """The ego's samples, and the shapes' rows there (n,), outside of which nothing touches; in no order.
-
-        One look per block: within it no sample, and nothing half way to the next one, is farther than half a
-        block and a sample from the one in its middle.
-        """
-        size, stop = self._block, start + len(here)
-        blocks = slice(start // size, -(-stop // size))
-        middle, samples, rows = block_samples(start, stop, size, len(self._kind))
-        away = np.abs(self._block_centre[blocks] - here.take(middle))
-        away -= (size // 2 + 1) * step
-        block, track = (away <= self._block_reach[blocks]).nonzero()
-        return samples.take(block, axis=0).ravel(), rows.take(block, axis=0).ravel() + track.repeat(size)
-
-    def _everything(self, count: int, start: int) -> tuple[Index, Index]:
-        """As :meth:`_near`, nothing left out."""
-        ego, track = np.indices((count, len(self._kind))).reshape(2, -1)
-        return ego, (ego + start) * len(self._kind) + track
-
-
-def _wrapped(angle: Array) -> Array:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _bulges(here: Points, orientation: Array, radius: float) -> Array:
@@ -357,6 +345,6 @@ def _bulges(here: Points, orientation: Array, radius: float) -> Array:
     bend = np.zeros(len(here))
     if len(here) > 2:
         bend[1:-1] = np.abs(here[2:] - 2.0 * here[1:-1] + here[:-2])
-        bend[1:-1] += radius * np.abs(np.diff(_wrapped(np.diff(orientation))))
+        bend[1:-1] += radius * np.abs(np.diff(wrap(np.diff(orientation))))
         bend[0], bend[-1] = bend[1], bend[-2]
     return np.asarray(_BULGE * np.maximum(bend[1:], bend[:-1]))

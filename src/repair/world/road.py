@@ -47,6 +47,8 @@ class RoadBoundary:
         Only read.
     vehicle : Vehicle
         The ego.
+    gap : float
+        Gaps and holes up to this width [m] between lanelets are road: they come from drawing the map.
 
     Attributes
     ----------
@@ -56,13 +58,15 @@ class RoadBoundary:
         More than the rounding of any coordinate of the region [m].
     """
 
-    def __init__(self, scenario: Any, vehicle: Vehicle) -> None:
+    def __init__(self, scenario: Any, vehicle: Vehicle, gap: float = 0.0) -> None:
         import shapely
 
         self._scenario = scenario
         self._corners = vehicle.corners
         outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
         self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
+        if gap > 0.0:
+            self.region = _closed(self.region, gap)
         shapely.prepare(self.region)
         self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
@@ -83,6 +87,23 @@ class RoadBoundary:
         unsure = np.flatnonzero(~known)
         inside = self.inside(self.outline(x[unsure], y[unsure], orientation[unsure]))
         return None if inside.all() else int(unsure[np.argmin(inside)])
+
+    def departure(self, x: float, y: float, orientation: float) -> str:
+        """Where a pose that leaves the road does so, and by how much, in words."""
+        import shapely
+
+        pose = (np.array([value]) for value in (x, y, orientation))
+        body = shapely.polygons(self.outline(*pose))[0]
+        around = shapely.clip_by_rect(self.region, *shapely.buffer(body, 1.0).bounds)
+        beyond = shapely.difference(body, around)
+        area = float(shapely.area(beyond))
+        if area <= 0.0:
+            return f"the ego touches the edge of the road at ({x:.1f}, {y:.1f})"
+        corners = shapely.points(shapely.get_coordinates(beyond))
+        far = float(np.max(shapely.distance(corners, around))) if not shapely.is_empty(around) else np.inf
+        where = shapely.centroid(beyond)
+        by = f"by {far:.2f} m, {area:.3f} m²" if np.isfinite(far) else "altogether"
+        return f"the ego leaves the road at ({where.x:.1f}, {where.y:.1f}) {by}"
 
     def inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
         """Whether outlines (K, V, 2) lie properly inside of the road: exact, and safe among threads."""
@@ -171,6 +192,15 @@ class RoadBoundary:
                 corners = np.array([triangle.vertices() for triangle in parts["triangulation"].unpack()])
                 self._triangles = shapely.STRtree(shapely.polygons(corners.reshape(-1, 3, 2)))
         return self._triangles is not False
+
+
+def _closed(region: Any, gap: float) -> Any:
+    """A region without gaps and holes up to a width, its outer edge where it was (morphological closing)."""
+    import shapely
+
+    half = 0.5 * gap + 1e-6
+    wide = shapely.buffer(region, half, join_style="mitre", mitre_limit=2.0)
+    return shapely.union(region, shapely.buffer(wide, -half, join_style="mitre", mitre_limit=2.0))
 
 
 @lru_cache(maxsize=256)

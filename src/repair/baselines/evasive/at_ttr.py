@@ -61,3 +61,7 @@ class AtTtr:
     def relaxed(self, t_rep: float) -> Iterable[tuple[RepairProblem, ...]]:
         """The open sides again with smaller and smaller margins."""
         return self.factory.relaxed(t_rep)
+
+    def widened(self, t_rep: float) -> Iterable[tuple[RepairProblem, ...]]:
+        """As the search has it: see :meth:`repair.search.probe.ProblemSource.widened`."""
+        return self.factory.widened(t_rep)

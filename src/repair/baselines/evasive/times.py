@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from repair.baselines.evasive.maneuvers import EvasiveCurve, EvasiveManeuver, maneuvers_at
 from repair.baselines.evasive.settings import EvasiveConfig
 from repair.curves.base import SplicedCurve
+from repair.deadline import in_time
 from repair.timegrid import INSTANT, intervals
 from repair.world.occupancy import first_entry
 
@@ -90,6 +91,11 @@ def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
     EvasiveResult
         Each time is the last scenario step before the TTC from which the manoeuvre avoids every
         collision until the end of the repairs (``situation.t_end``).
+
+    Raises
+    ------
+    repair.deadline.OutOfTime
+        If the deadline passes before.
     """
     ttc = situation.conflict.time
     if ttc == float("inf"):
@@ -102,6 +108,7 @@ def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
     for maneuver in EvasiveManeuver:
         times[maneuver] = -float("inf")
         for step in range(latest, -1, -1):
+            in_time()
             curve = _escape(situation, settings, maneuver, step * situation.scene.dt)
             if curve is not None:
                 times[maneuver], curves[maneuver] = curve.t_start, curve

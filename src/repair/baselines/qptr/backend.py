@@ -25,6 +25,7 @@ from repair.baselines.qptr.settings import QptrConfig
 from repair.baselines.qptr.time_grid import time_grid
 from repair.curves.base import Curve
 from repair.curves.bernstein import BernsteinCurve
+from repair.deadline import OutOfTime, in_time, until
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
 
@@ -100,7 +101,12 @@ class QptrBackend:
                 f"a repair from t = {problem.t_rep:g} s to {problem.t_end:g} s has no duration"
             )
         try:
-            axes, tasks = self._axes(problem, duration)
+            with until(None if time_limit is None else begin + time_limit):
+                axes, tasks = self._axes(problem, duration)
+        except OutOfTime:
+            spent, said = time.perf_counter() - begin, "no time is left"
+            said = said if time_limit is None else f"time limit of {time_limit:g} s"
+            return SolveResult(SolveStatus.TIME_LIMIT, build_time=spent, detail=said)
         except NoCorridor as closed:
             spent = time.perf_counter() - begin
             return SolveResult(SolveStatus.NO_CORRIDOR, build_time=spent, detail=str(closed))
@@ -133,16 +139,28 @@ class QptrBackend:
         )
 
     def _axes(self, problem: RepairProblem, duration: float) -> tuple[list[_Axis], Array]:
-        """The QP of each axis that is planned, and the tasks of both axes (2, 3 + K)."""
+        """The QP of each axis that is planned, and the tasks of both axes (2, 3 + K).
+
+        Raises
+        ------
+        NoCorridor
+            If there is none.
+        OutOfTime
+            If the deadline passes before.
+        """
+        in_time()
         pieces = max(1, math.ceil(duration / self.config.spacing - 1e-9))
         grid = time_grid(problem, pieces)
         # Rounded, so that repairs of the same duration share what has been built for it.
         length = round(duration / pieces, 12)
         c = self.config
-        qps = [
-            axis_qp(axis, problem.limits, pieces, length, c.degree, c.continuity, c.w_jerk, c.w_deviation)
-            for axis in range(2 if problem.lateral else 1)
-        ]
+        qps = []
+        for axis in range(2 if problem.lateral else 1):
+            in_time()
+            qps.append(
+                axis_qp(axis, problem.limits, pieces, length, c.degree, c.continuity, c.w_jerk, c.w_deviation)
+            )
+        in_time()
         times = np.concatenate((grid.times, problem.t_rep + qps[0].structure.nodes))
         reference = problem.reference.sample(times).position
         count = len(grid.times)

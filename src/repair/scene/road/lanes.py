@@ -11,7 +11,7 @@ from repair.arrays import Array, frozen
 from repair.errors import ScenarioError
 from repair.scene.traffic.shapes import FAR
 
-__all__ = ["Lane", "lanes_of", "locate", "wrap"]
+__all__ = ["Lane", "lanes_of", "locate"]
 
 _NOT_FOR_CARS = frozenset({"sidewalk", "bicycleLane", "crosswalk", "busStop", "border"})
 
@@ -103,11 +103,6 @@ def lanes_of(network: Any) -> tuple[dict[int, Lane], list[str]]:
     if not lanes:
         raise ScenarioError("the scenario has no lanelet that could be driven on")
     return lanes, notes
-
-
-def wrap(angle: Any) -> Any:
-    """Angle(s) in [-pi, pi)."""
-    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def locate(line: Array, point: Array) -> tuple[float, float, float]:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, wrap
 from repair.errors import ScenarioError
 from repair.scene.road.centre_line import BEHIND, centre_line, cut_line, direction_at
 from repair.scene.road.goal import goal_groups, point_of
-from repair.scene.road.lanes import Lane, locate, wrap
+from repair.scene.road.lanes import Lane, locate
 
 __all__ = ["Route", "plan_route"]
 

@@ -5,12 +5,15 @@ What CommonRoad leaves open is settled here, towards the larger occupancy:
 - a shape turns about its own centre, which is then moved by the state (commonroad-io's reading);
 - an uncertain position or orientation takes the rectangle that encloses every placement;
 - a missing orientation is the direction of motion;
-- a dynamic obstacle without a prediction stands where it is (noted);
+- a dynamic obstacle without a prediction stands where it is (noted), or moves on where that is asked for;
 - a set-based occupancy over [k, k + 1] counts at k and at k + 1;
+- a trailer follows its tractor (:mod:`repair.scene.traffic.trailers`);
 - after its prediction an obstacle is gone (CommonRoad's own reading), or held, or moves on.
 
 A prediction with a hole, or with steps out of order, is refused: commonroad-io and the drivability
-checker count its states instead of reading their time steps, and would put the obstacle elsewhere.
+checker count its states instead of reading their time steps, and would put the obstacle elsewhere. A phantom,
+which neither looks at, is absent in between. Where CommonRoad's own collision check reads something else, the
+scene has a note.
 """
 
 from __future__ import annotations
@@ -26,10 +29,16 @@ from repair.scene.settings import AFTER_PREDICTION
 from repair.scene.traffic.late import steps_late
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import obstacle_of_rows, require_sane
-from repair.scene.traffic.shapes import Placed, occupied
+from repair.scene.traffic.shapes import Placed, occupied, off_centre
+from repair.scene.traffic.stepwise import holds_over_intervals
 from repair.scene.traffic.timeline import continued, headings_of, state_occupancy, steps_of, timeline
+from repair.scene.traffic.trailers import is_train
 
 __all__ = ["last_predicted_step", "obstacles_of"]
+
+_ID_MAX = 2**63 - 1  # what an array of integers can hold
+_NAMED = 5  # so many obstacles are named in a note
+_TURNED = 1e-3  # half of a heading [rad] from which on a body counts as turned
 
 
 def _all(scenario: Any) -> list[Any]:
@@ -106,10 +115,13 @@ def obstacles_of(
     found: list[Obstacle] = []
     ego: Obstacle | None = None
     notes: list[str] = []
+    moves_on = after_prediction == "constant_velocity"
     for obstacle in _all(scenario):
         name = int(obstacle.obstacle_id)
+        if abs(name) > _ID_MAX:
+            raise ScenarioError(f"obstacle {name}: its id is beyond {_ID_MAX}")
         try:
-            placed, role = _placed(obstacle, first_step, first_step + n_steps)
+            placed, role = _placed(obstacle, first_step, first_step + n_steps, moves_on)
         except ScenarioError as error:
             raise ScenarioError(f"obstacle {name}: {error}") from error
         kind = str(getattr(getattr(obstacle, "obstacle_type", None), "value", "unknown"))
@@ -138,10 +150,50 @@ def obstacles_of(
             )
         else:
             found.append(made)
-    return tuple(found), ego, notes
+    return tuple(found), ego, [*notes, *_read_otherwise(found)]
 
 
-def _placed(obstacle: Any, first: int, last: int) -> tuple[Placed | dict[int, Placed], str]:
+def _read_otherwise(found: list[Obstacle]) -> list[str]:
+    """What commonroad-io or CommonRoad's own collision check reads otherwise, a line for each kind."""
+    of = [(o.id, o.source, o.states) for o in found if o.role in ("dynamic", "set_based", "static")]
+    of = [item for item in of if getattr(item[1], "obstacle_shape", None) is not None]
+    over = [name for name, source, _ in of if holds_over_intervals(source)]
+    trains = [name for name, source, _ in of if is_train(source)]
+    turned = [
+        name
+        for name, source, states in of
+        if name not in trains
+        and off_centre(source.obstacle_shape)
+        and np.abs(np.sin(0.5 * np.nan_to_num(states[:, 2]))).max() > _TURNED
+    ]
+    notes = []
+    if over:
+        notes.append(
+            f"{_named(over)}: occupancies over intervals count at every step of theirs; CommonRoad's own "
+            "collision check counts them at one step each, and is asked about them step by step"
+        )
+    if trains:
+        notes.append(
+            f"{_named(trains)}: the trailer follows its tractor; CommonRoad's own check lays it on top"
+        )
+    if turned:
+        notes.append(
+            f"{_named(turned)}: a body that is not centred on its position turns about its own centre, as in "
+            "CommonRoad's own collision check"
+        )
+    return notes
+
+
+def _named(names: list[int]) -> str:
+    """Obstacles by their ids, the first few of them."""
+    shown = ", ".join(str(name) for name in names[:_NAMED])
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"obstacle{'s' if len(names) > 1 else ''} {shown}{more}"
+
+
+def _placed(
+    obstacle: Any, first: int, last: int, moves_on: bool = False
+) -> tuple[Placed | dict[int, Placed], str]:
     """Where an obstacle is, for good or by time step, and its role.
 
     Raises
@@ -152,6 +204,8 @@ def _placed(obstacle: Any, first: int, last: int) -> tuple[Placed | dict[int, Pl
     still = _standing(obstacle)
     if still is not None:
         require_sane([still[1]])
+        if moves_on and still[0] == "dynamic" and abs(np.nan_to_num(still[1].state[3])) > 0.0:
+            return {steps_of(obstacle.initial_state.time_step)[0]: still[1]}, "dynamic"
         return still[1], still[0]
     steps, role = timeline(obstacle, first, last)
     require_sane(steps.values())

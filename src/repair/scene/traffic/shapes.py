@@ -19,6 +19,7 @@ __all__ = [
     "enclosing",
     "interval",
     "occupied",
+    "off_centre",
     "outlines",
     "place",
     "polygons_of",
@@ -30,6 +31,7 @@ FAR = 1e8
 """Coordinates beyond this [m] are no place on Earth, and leave no digits for what happens there."""
 
 _EDGE = 2.0  # outline points are at most this far apart [m]
+_OFF_CENTRE = 1e-3  # a centre farther from the position than this [m] is not there by rounding
 _CORNERS = 16  # of the polygon circumscribed about a circle
 
 
@@ -159,25 +161,22 @@ def place(shape: Any, position: Array, heading: float, speed: float) -> Placed:
 
 
 def enclosing(shape: Any, area: Any, low: float, high: float, speed: float) -> Placed:
-    """Rectangle around every placement with the position in ``area`` and the heading in [low, high]."""
+    """Rectangle around every placement with the position in ``area`` and the heading in [low, high].
+
+    Around all that :func:`place` makes of them: each part turns about its own centre, and the centre's offset
+    from the position does not turn.
+    """
     heading = (low + high) / 2.0
     spread = min((high - low) / 2.0, np.pi)
-    body = np.concatenate(outlines(shape, np.zeros(2), 0.0))
-    radius = np.hypot(body[:, 0], body[:, 1])
-    angle = np.arctan2(body[:, 1], body[:, 0])
-    # a corner sweeps an arc; its extreme along an axis is inside the arc or at one end
-    reach = []
-    for axis in (0.0, np.pi / 2, np.pi, -np.pi / 2):
-        off = np.abs((angle - axis + np.pi) % (2 * np.pi) - np.pi)
-        reach.append(float(np.max(radius * np.cos(np.maximum(off - spread, 0.0)))))
     if hasattr(area, "center") or hasattr(area, "shapes"):
         where = np.concatenate(outlines(area, np.zeros(2), 0.0))
     else:
         where = np.asarray(area, dtype=np.float64)[None, :2]
     c, s = np.cos(heading), np.sin(heading)
     local = where @ np.array([[c, -s], [s, c]])
-    upper = np.max(local, axis=0) + reach[:2]
-    lower = np.min(local, axis=0) - reach[2:]
+    lowest, highest = np.array([_reach(part, heading, spread) for part in _parts(shape)]).transpose(1, 0, 2)
+    upper = np.max(local, axis=0) + np.max(highest, axis=0)
+    lower = np.min(local, axis=0) + np.min(lowest, axis=0)
     center = (upper + lower) / 2.0 @ np.array([[c, s], [-s, c]])
     half = (upper - lower) / 2.0
     middle = np.mean(where, axis=0)
@@ -187,6 +186,27 @@ def enclosing(shape: Any, area: Any, low: float, high: float, speed: float) -> P
         None,
         (float(middle[0]), float(middle[1]), heading, speed),
     )
+
+
+def _reach(part: Any, heading: float, spread: float) -> tuple[Array, Array]:
+    """Lowest and highest coordinates (2,) of a part turned by ``heading`` +- ``spread``, in axes along it."""
+    center = _center_of(part)
+    body = np.concatenate(outlines(part, -center, 0.0))
+    radius = np.hypot(body[:, 0], body[:, 1])
+    angle = np.arctan2(body[:, 1], body[:, 0])
+    # a corner sweeps an arc; its extreme along an axis is inside the arc or at one end
+    reach = []
+    for axis in (0.0, np.pi / 2, np.pi, -np.pi / 2):
+        off = np.abs((angle - axis + np.pi) % (2 * np.pi) - np.pi)
+        reach.append(float(np.max(radius * np.cos(np.maximum(off - spread, 0.0)))))
+    c, s = np.cos(heading), np.sin(heading)
+    middle = center @ np.array([[c, -s], [s, c]])
+    return middle - reach[2:], middle + reach[:2]
+
+
+def off_centre(shape: Any) -> bool:
+    """Whether a body is not centred on its position, so that where it turns about makes a difference."""
+    return any(float(np.hypot(*_center_of(part))) > _OFF_CENTRE for part in _parts(shape))
 
 
 def occupied(shape: Any) -> Placed:

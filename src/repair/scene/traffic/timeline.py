@@ -11,6 +11,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.errors import ScenarioError
 from repair.scene.traffic.shapes import Placed, enclosing, interval, occupied, outlines, place, union
+from repair.scene.traffic.trailers import is_train, train
 
 __all__ = [
     "STEPS_MAX",
@@ -147,19 +148,16 @@ def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], s
             states.setdefault(steps_of(state.time_step)[0], state)
     if states:
         order = sorted(states)
+        headings = dict(zip(order, headings_of([states[k] for k in order]), strict=True))
+        if is_train(obstacle):
+            return train(obstacle, states, headings), "dynamic"
         shape = obstacle.obstacle_shape
-        for step, heading in zip(order, headings_of([states[k] for k in order]), strict=True):
-            # A trailer: commonroad-io knows how it trails.
-            if getattr(states[step], "hitch_angle", None) is not None:
-                item = occupied(obstacle.occupancy_at_time(step).shape)
-                placed[step] = item._replace(state=state_occupancy(shape, states[step], heading).state)
-            else:
-                body = (
-                    shape if trajectory is None or step == order[0] else getattr(prediction, "shape", shape)
-                )
-                placed[step] = state_occupancy(body, states[step], heading)
+        for step, heading in headings.items():
+            body = shape if trajectory is None or step == order[0] else getattr(prediction, "shape", shape)
+            placed[step] = state_occupancy(body, states[step], heading)
     if prediction is not None and trajectory is None:
-        _check_order([steps_of(o.time_step) for o in prediction.occupancy_set], states)
+        # A phantom may pause: CommonRoad's own check never looks at it, and does not count its states.
+        _check_order([steps_of(o.time_step) for o in prediction.occupancy_set], states, initial is None)
         for occupancy in prediction.occupancy_set:
             low, high = steps_of(occupancy.time_step)
             item = occupied(occupancy.shape)
@@ -170,15 +168,15 @@ def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], s
     return placed, "dynamic"
 
 
-def _check_order(steps: Sequence[tuple[int, int]], initial: Iterable[int]) -> None:
-    """Time steps of a prediction: from the initial one on, in order, without a hole."""
+def _check_order(steps: Sequence[tuple[int, int]], initial: Iterable[int], may_pause: bool = False) -> None:
+    """Time steps of a prediction: from the initial one on, in order, without a hole unless it may pause."""
     before = list(initial)[:1]
     if before and steps and steps[0][0] > before[0] + 1:
         raise ScenarioError(
             f"its prediction starts at time step {steps[0][0]}, its initial state at {before[0]}"
         )
     for (low, high), (following, _) in pairwise(steps):
-        if not low < following <= high + 1:
+        if not low < following or (following > high + 1 and not may_pause):
             raise ScenarioError(f"its prediction goes from time step {high} to {following}")
 
 

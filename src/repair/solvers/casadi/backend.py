@@ -5,9 +5,10 @@ What a curve that this backend calls solved keeps, recomputed from the solution 
 * speed (0 to v_max), lateral speed, s'' and l'', s''' and l''', and the direction of travel
   (|l'| <= tan(heading) s'): the Bernstein points of every piece are inside, so the curve is, at
   *every* time from t_rep on;
-* obstacles, ``obstacles: hull``: for every window (at most one scenario step long) the Bernstein
-  points lie beyond the moving edge of the inflated box, so the curve is clear at *every* time until
-  t_end, the box moving linearly between scenario steps (:mod:`repair.solvers.casadi.separation`);
+* obstacles, ``obstacles: hull``: for every window (at most one scenario step long, or ``WINDOW``,
+  whichever is longer: the cost grows with their number) the Bernstein points lie beyond the moving
+  edge of the inflated box, so the curve is clear at *every* time until t_end, the box moving linearly
+  between scenario steps (:mod:`repair.solvers.casadi.separation`);
   ``obstacles: sampled``: the curve is clear at the control points' Greville times, and only there;
 * the road's edges: as ``hull``, with the narrowest width over the s the curve covers in a window;
 * accelerations in the plane (friction circle, longitudinal and lateral limit), the curvature of the
@@ -38,6 +39,7 @@ from repair.curves.base import Curve
 from repair.curves.bases import n_points_for
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
+from repair.deadline import OutOfTime, until
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out
@@ -49,8 +51,10 @@ from repair.solvers.casadi.settings import CasadiConfig
 from repair.solvers.casadi.sides import open_sides
 from repair.timegrid import INSTANT
 
-__all__ = ["CasadiBackend", "make"]
+__all__ = ["WINDOW", "CasadiBackend", "make"]
 
+#: A window is no shorter than this [s]: steps of the scenario that fall inside are covered by its line.
+WINDOW = 0.1
 _TRUST = 8.0  # [m] that s may move between the first two rounds; half of it in the next, and so on
 
 
@@ -90,10 +94,14 @@ class CasadiBackend:
         _require(problem)
         deadline = None if time_limit is None else begin + time_limit
         try:
-            model = build_model(self.structure(problem, timed=time_limit is not None))
-            instance, points = lay_out(problem, model)
-            built, before = time.perf_counter(), model.build_time
-            result = self._rounds(instance, points, warm_start, deadline, time_limit)
+            with until(deadline):
+                model = build_model(self.structure(problem, timed=time_limit is not None))
+                instance, points = lay_out(problem, model)
+                built, before = time.perf_counter(), model.build_time
+                result = self._rounds(instance, points, warm_start, deadline, time_limit)
+        except OutOfTime as over:
+            spent = time.perf_counter() - begin
+            return SolveResult(SolveStatus.TIME_LIMIT, build_time=spent, detail=_cut(time_limit, over))
         except (BackendError, ImportError) as error:
             return SolveResult(
                 SolveStatus.UNAVAILABLE, build_time=time.perf_counter() - begin, detail=str(error)
@@ -116,7 +124,7 @@ class CasadiBackend:
             n=n_points_for(problem.t_end - problem.t_rep, self.spacing, self.degree),
             degree=self.degree,
             spacing=self.spacing,
-            windows=max(1, int(np.ceil(self.spacing / problem.dt - 1e-9))),
+            windows=max(1, int(np.ceil(self.spacing / max(problem.dt, WINDOW) - 1e-9))),
             lateral=problem.lateral,
             sampled=c.obstacles == "sampled",
             weights=(c.w_acceleration, c.w_jerk, c.w_reference),
@@ -150,11 +158,15 @@ class CasadiBackend:
             found, cost = self._curve(instance, points), instance.objective(points)
             return SolveResult(SolveStatus.SOLVED, found, cost, detail=word, residuals=residuals)
         points = self._warmer(instance, separation, points, residuals, warm_start)
-        iterations = 0
+        iterations, cut = 0, _cut(time_limit)
         for round_ in range(self.config.rounds):
             trust = _TRUST * 0.5**round_ if round_ else None
             low, high = instance.bounds(separation, points, trust)
-            points, status, word, count = self._run(instance, points, low, high, deadline)
+            try:
+                points, status, word, count = self._run(instance, points, low, high, deadline)
+            except OutOfTime as over:  # what there is may do
+                status, word, count = SolveStatus.TIME_LIMIT, "", 0
+                cut = _cut(time_limit, over)
             iterations += count
             residuals = residuals_of(instance, separation, points)
             kept = largest_violation(residuals) <= TOLERANCE
@@ -172,8 +184,8 @@ class CasadiBackend:
         if status is SolveStatus.SOLVED and not kept:
             status = SolveStatus.NUMERICAL_ERROR
             detail = f"{worst_family(residuals)} after {self.config.rounds} rounds"
-        elif status is SolveStatus.TIME_LIMIT and time_limit is not None:
-            detail = f"time limit of {time_limit:g} s"
+        elif status is SolveStatus.TIME_LIMIT:
+            detail = cut
         elif status not in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE):
             detail = f"{word}; at the last iterate {worst_family(residuals)}"
         usable = kept and status is not SolveStatus.INFEASIBLE
@@ -244,6 +256,12 @@ def _answered(instance: Instance, points: Array, residuals: dict[str, float]) ->
     return (
         not instance.problem.lateral and largest_violation(residuals) <= 0.0 and instance.keeps_circle(points)
     )
+
+
+def _cut(time_limit: float | None, why: OutOfTime | None = None) -> str:
+    """That there was no time, and for what, as a sentence."""
+    said = "no time is left" if time_limit is None else f"time limit of {time_limit:g} s"
+    return f"{said}: {why}" if why is not None and str(why) else said
 
 
 def _overhang(problem: RepairProblem) -> float:

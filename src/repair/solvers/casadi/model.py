@@ -17,6 +17,7 @@ import numpy as np
 
 from repair.arrays import Array
 from repair.backend.base import SolveStatus
+from repair.deadline import Estimate, held, in_time
 from repair.solvers.casadi.buffered import (
     Buffered,
     Deadline,
@@ -32,6 +33,16 @@ __all__ = ["TOLERANCE", "Model", "Solution", "build_model", "status_of"]
 
 TOLERANCE = 1e-6  #: largest violation of a curve that is called solved
 _DAQP_INFEASIBLE = -1
+# What making a model takes [s], by entry of its matrix, and an NLP, by sample; CasADi cannot be interrupted.
+# Before any was made they are those of a slow machine.
+_LAID_OUT = Estimate(5e-7)
+_MADE = {
+    (solver, lateral): Estimate(rate)
+    for solver, lateral, rate in (
+        ("ipopt", True, 3e-3), ("ipopt", False, 1.5e-3),
+        ("sqpmethod", True, 2e-3), ("sqpmethod", False, 1e-3),
+    )
+}  # fmt: skip
 _STATUS = {
     "Solve_Succeeded": SolveStatus.SOLVED,
     "Solved_To_Acceptable_Level": SolveStatus.SOLVED,
@@ -73,9 +84,15 @@ class Model(Layout):
     """
 
     def __init__(self, structure: Structure) -> None:
+        in_time(_LAID_OUT.of(structure.entries), "the model")
+        begin = time.perf_counter()
+        with _LAID_OUT.watch(structure.entries):
+            self._lay_out(structure)
+        self.build_time = time.perf_counter() - begin
+
+    def _lay_out(self, structure: Structure) -> None:
         import casadi as ca
 
-        begin = time.perf_counter()
         super().__init__(structure)
         self._deadline: Deadline | None = None
         self._lock = threading.Lock()  # models are shared, and so are their buffers
@@ -89,7 +106,6 @@ class Model(Layout):
             self._compile_elastic()
         except RuntimeError as error:
             raise unavailable(error) from error
-        self.build_time = time.perf_counter() - begin
 
     @cached_property
     def nlp(self) -> Buffered:
@@ -99,11 +115,17 @@ class Model(Layout):
         ------
         BackendError
             If CasADi cannot make it.
+        OutOfTime
+            If making it takes longer than there is time.
         """
+        s = self.structure
+        estimate = _MADE[s.solver, s.lateral]
+        in_time(estimate.of(s.points), "making the NLP")
         begin = time.perf_counter()
         try:
-            function, self._deadline = make_nlp(self, self._hessian, self._matrix)
-            return Buffered(function)
+            with estimate.watch(s.points):
+                function, self._deadline = make_nlp(self, self._hessian, self._matrix)
+                return Buffered(function)
         except RuntimeError as error:
             raise unavailable(error) from error
         finally:
@@ -159,7 +181,7 @@ class Model(Layout):
         lba = np.concatenate((low, np.full(len(self._soft), -np.inf)))
         uba = np.concatenate((upper, high[self._soft]))
         g = np.append(1e-4 * slope, 100.0)
-        with self._lock:
+        with held(self._lock):
             out = self._elastic_qp(g=g, lba=lba, uba=uba, lbx=self._elastic_low)
             if int(self._elastic_qp.stats()["return_status"]) <= 0:
                 return None
@@ -187,7 +209,7 @@ class Model(Layout):
         rows = self.linear_count
         if (low[:rows] > high[:rows]).any():
             return None, False  # CasADi calls this an error
-        with self._lock:
+        with held(self._lock):
             out = self._qp(g=slope, lba=low[:rows], uba=high[:rows], x0=x0)
             word = int(self._qp.stats()["return_status"])
             if word > 0:
@@ -216,9 +238,12 @@ class Model(Layout):
         ------
         BackendError
             If CasADi cannot make the solver.
+        OutOfTime
+            If making it takes longer than there is time, or another thread uses it for longer.
         """
-        with self._lock:
+        with held(self._lock):
             function = self.nlp
+            in_time()
             if self._deadline is not None:
                 self._deadline.at = deadline if deadline is not None else float("inf")
             try:
@@ -236,7 +261,13 @@ class Model(Layout):
 
 @lru_cache(maxsize=256)
 def build_model(structure: Structure) -> Model:
-    """The model of a structure; made at the first call, kept after that."""
+    """The model of a structure; made at the first call, kept after that.
+
+    Raises
+    ------
+    OutOfTime
+        If making it takes longer than there is time.
+    """
     return Model(structure)
 
 

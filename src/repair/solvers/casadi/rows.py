@@ -115,6 +115,16 @@ class Structure:
     timed: bool = False
 
     @property
+    def points(self) -> int:
+        """Number of samples, the ends of all windows: what the cost of making the NLP grows with."""
+        return self.segments * self.windows
+
+    @property
+    def entries(self) -> int:
+        """About how many entries the linear rows have: what the cost of laying them out grows with."""
+        return self.segments**2 * self.axes * (self.degree * (self.windows + 3) * self.axes)
+
+    @property
     def segments(self) -> int:
         """Number of polynomial pieces."""
         return self.n - self.degree

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from repair.arrays import Array
+from repair.deadline import in_time
 from repair.solvers.casadi.instance import Instance, guide_of
 from repair.solvers.casadi.residuals import residuals_of
 from repair.solvers.casadi.separation import SIDE_OF_BOUND, Separation, separate
@@ -50,6 +51,11 @@ def open_sides(instance: Instance, points: Array) -> Opening:
         Its ``relaxed`` is set where there is a solution.
     points : (n, 2) array
         Control points to begin with, less the origin.
+
+    Raises
+    ------
+    repair.deadline.OutOfTime
+        If the deadline passes before.
     """
     model, problem, windows = instance.model, instance.problem, instance.windows
     slope = instance.slope
@@ -61,6 +67,7 @@ def open_sides(instance: Instance, points: Array) -> Opening:
     why, before = "", None
     closest: tuple[Array, dict[str, float]] | None = None
     for _ in range(_SIDES):
+        in_time()
         separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
         if separation.why:
             return Opening(separation, points, separation.why, closest)

@@ -19,9 +19,10 @@ from repair.curves.base import Curve
 from repair.curves.bases import n_points_for
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
+from repair.deadline import OutOfTime
 from repair.problem.problem import RepairProblem
 from repair.solvers.ego.cost_structure import SIZES, Sizes
-from repair.solvers.ego.minimise import Minimiser, OutOfTime
+from repair.solvers.ego.minimise import Minimiser
 from repair.solvers.ego.pairs import closest_distance
 from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.ego.stages import Stages

@@ -13,17 +13,14 @@ import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs, dtbtrs
 
 from repair.arrays import Array
+from repair.deadline import OutOfTime
 from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.ego.spline_cost import SplineCost
 
-__all__ = ["Minimiser", "Minimum", "OutOfTime", "lbfgs", "minimiser", "newton"]
+__all__ = ["Minimiser", "Minimum", "lbfgs", "minimiser", "newton"]
 
 _SUFFICIENT = 1e-4  # share of the promised decrease that a step must bring (Armijo)
 _SHORTEST = 1e-9
-
-
-class OutOfTime(Exception):
-    """The deadline has passed."""
 
 
 class Minimum(NamedTuple):

@@ -83,7 +83,7 @@ class Stages:
 
         Raises
         ------
-        repair.solvers.ego.minimise.OutOfTime
+        repair.deadline.OutOfTime
             If the deadline passes before.
         """
         config = self.config
@@ -124,7 +124,7 @@ class Stages:
 
         Raises
         ------
-        repair.solvers.ego.minimise.OutOfTime
+        repair.deadline.OutOfTime
             If the deadline passes before.
         """
         weights, points, p = self.config.refine, deformed.points, self.degree

@@ -1,0 +1,100 @@
+"""What the ego demands of tyres, engine and steering, against the limits asked for and the vehicle's own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.certify.certificate import CertificateRow, at_least, at_most
+from repair.certify.motion import Motion, States
+
+if TYPE_CHECKING:
+    from repair.problem.limits import Limits
+    from repair.vehicle.parameters import Vehicle
+
+_PLACE, _ORIENTATION = 0.02, 0.03  # the drivability checker's tolerances [m], [rad]
+_PARTS = 20  # of a step, in which the model is integrated
+
+__all__ = ["driven_rows", "physical_rows", "weakened"]
+
+
+def driven_rows(motion: Motion, limits: Limits, *, reference: bool) -> list[CertificateRow]:
+    """The middle of the vehicle along the curve, from millisecond to millisecond.
+
+    Parameters
+    ----------
+    motion : Motion
+    limits : Limits
+    reference : bool
+        A reference may begin by rolling back, as the planning problem has it.
+    """
+    step = np.diff(motion.t)
+    along = np.diff(motion.speed) / step
+    across = 0.5 * (motion.speed[1:] + motion.speed[:-1]) * np.diff(motion.heading) / step
+    slowest = min(0.0, float(motion.speed[0])) if reference else 0.0
+    return [
+        at_most("speed, driven", float(motion.speed.max()), limits.v_max, "sampled", "m/s"),
+        at_least("speed, driven, least", float(motion.speed.min()), slowest, "sampled", "m/s"),
+        at_least("acceleration, driven, least", float(along.min()), limits.a_min, "sampled", "m/s²"),
+        at_most("acceleration, driven, largest", float(along.max()), limits.a_max, "sampled", "m/s²"),
+        at_most("lateral acceleration", float(np.abs(across).max()), limits.a_lat, "sampled", "m/s²"),
+        at_most("friction circle", float(np.hypot(along, across).max()), limits.a_total, "sampled", "m/s²"),
+    ]
+
+
+def physical_rows(states: States, dt: float, vehicle: Vehicle) -> list[CertificateRow]:
+    """The states of the solution file before CommonRoad's own parameters, whatever was asked for.
+
+    The steering rate is told; what counts of it is where the vehicle gets to with the rate that it has.
+    """
+    v, delta = states.speed, states.steering
+    along, rate = np.diff(v) / dt, np.diff(delta) / dt
+    across = v**2 * np.tan(delta) / vehicle.wheelbase
+    grip = np.hypot(along, across[:-1])  # at the start of a step, as the drivability checker has it
+    engine = vehicle.engine_acceleration(np.minimum(v[1:], v[:-1]))
+    use = np.where(along > 0.0, along / engine, -along / vehicle.a_max)
+    most, rate_most, way = vehicle.a_max, vehicle.steering_rate_max, float(np.abs(rate).max(initial=0.0))
+    off, turned = _missed(states, dt, vehicle)
+    return [
+        at_most("vehicle: speed", float(np.abs(v).max()), vehicle.v_max, "files", "m/s"),
+        at_most("vehicle: engine and brakes", float(use.max(initial=0.0)), 1.0, "files", "share"),
+        at_most("vehicle: grip of the tyres", float(grip.max(initial=0.0)), most, "files", "m/s²"),
+        at_most("vehicle: steering angle", float(np.abs(delta).max()), vehicle.steering_max, "files", "rad"),
+        CertificateRow(
+            "vehicle: steering rate", way, rate_most, rate_most - way, way <= rate_most, "files", "rad/s",
+            claim=False,
+        ),
+        at_most("vehicle: place missed with it cut off", off, _PLACE, "files", "m"),
+        at_most("vehicle: orientation missed with it cut off", turned, _ORIENTATION, "files", "rad"),
+    ]  # fmt: skip
+
+
+def _missed(states: States, dt: float, vehicle: Vehicle) -> tuple[float, float]:
+    """By how much the next states are missed, the steering rate cut off: place [m], orientation [rad]."""
+    psi = np.unwrap(states.orientation)
+    axle = states.xy - vehicle.rear * np.stack([np.cos(psi), np.sin(psi)], axis=1)
+    v, delta = states.speed, states.steering
+    reach = vehicle.steering_rate_max * dt
+    change, gained = np.clip(np.diff(delta), -reach, reach), np.diff(v)
+    here, body, share = axle[:-1].copy(), psi[:-1].copy(), 1.0 / _PARTS
+    for i in range(_PARTS):
+        middle = (i + 0.5) * share
+        way = (v[:-1] + middle * gained) * dt * share
+        turn = way * np.tan(delta[:-1] + middle * change) / vehicle.wheelbase
+        here += way[:, None] * np.stack([np.cos(body + 0.5 * turn), np.sin(body + 0.5 * turn)], axis=1)
+        body += turn
+    off = np.abs(here - axle[1:])
+    return float(off.max(initial=0.0)), float(np.abs(body - psi[1:]).max(initial=0.0))
+
+
+def weakened(limits: Limits, usual: Limits) -> list[str]:
+    """Limits that allow more than those that hold where nothing is asked for, in words."""
+    found = []
+    for name in ("v_max", "v_lat", "a_max", "a_lat", "a_total", "j_lon", "j_lat", "curvature"):
+        value, most = getattr(limits, name), getattr(usual, name)
+        if value > most * (1.0 + 1e-9):
+            found.append(f"limits.{name}={value:g} (usual: {most:g})")
+    if limits.a_min < usual.a_min * (1.0 + 1e-9):
+        found.append(f"limits.a_min={limits.a_min:g} (usual: {usual.a_min:g})")
+    return found

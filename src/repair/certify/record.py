@@ -1,0 +1,217 @@
+"""What ``result.json`` says, held against what it would say if the result were made again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from repair.certify.certificate import CertificateRow, equal, said
+from repair.curves.base import Curve, SplicedCurve
+from repair.errors import RepairError
+
+if TYPE_CHECKING:
+    from repair.prepare import Prepared
+    from repair.search.result import SearchResult
+
+__all__ = ["Again", "differences", "record_rows", "searched_again"]
+
+#: What a run is free to differ in: times of the clock, versions, names of files, iterations.
+_FREE = frozenset(
+    {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "drawing_file", "provenance",
+     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations"}
+)  # fmt: skip
+#: What follows from the scenario, the configuration and the curve alone.
+_DIRECT = (
+    "schema", "scenario", "backend", "ttc_s", "contact_ttc_s", "conflict", "reference", "t_end_s", "limits",
+    "notes", "trajectory", "peak_deceleration_mps2", "peak_acceleration_mps2",
+    "peak_lateral_acceleration_mps2", "peak_total_acceleration_mps2", "min_speed_mps", "max_speed_mps",
+)  # fmt: skip
+_EXACT, _SOLVED = 1e-6, 1e-4  # a solver on another machine ends a little elsewhere
+_SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Again:
+    """The record made again.
+
+    Attributes
+    ----------
+    record : dict or None
+        By a search; None where it cannot be repeated here.
+    direct : dict
+        By the curve in the file, without a search.
+    limited : bool
+        The search had a time limit or was interrupted; what it visited has to come out the same.
+    other : str
+        Why the search may come out otherwise; empty where it may not.
+    """
+
+    record: dict[str, Any] | None
+    direct: dict[str, Any]
+    limited: bool
+    other: str = ""
+
+
+def searched_again(content: Mapping[str, Any], prepared: Prepared, curve: Curve | None) -> Again:
+    """Search again, and work out beside it what needs no search.
+
+    Parameters
+    ----------
+    content : mapping
+        What ``result.json`` holds.
+    prepared : Prepared
+        The scenario, loaded and laid out anew.
+    curve : Curve or None
+        The repaired curve in ``content``.
+    """
+    from importlib.metadata import PackageNotFoundError, version
+
+    from repair.search.result import SearchResult, SearchStatus
+
+    def here(name: str) -> str | None:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            return None
+
+    told = content.get("versions") or {}
+    names = sorted(n for n, v in told.items() if n != "python" and v != here(n))
+    other = f"made with other versions of {', '.join(names)}" if names else ""
+    status = SearchStatus.NO_CONFLICT if curve is None else SearchStatus.FOUND
+    f_ttr = float("inf") if curve is None else float(content["f_ttr_s"])
+    direct = _record(prepared, SearchResult(status, prepared.conflict, f_ttr, curve))
+    limited = prepared.config.search.time_limit is not None or not content.get("complete", True)
+    try:
+        made = _record(prepared, None)
+    except RepairError as error:  # a backend that is not here
+        return Again(None, direct, limited, str(error))
+    return Again(made, direct, limited, other)
+
+
+def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
+    """The record of a search, or of what is given as its answer."""
+    from repair.backend.base import Capabilities
+    from repair.baselines.evasive.at_ttr import AtTtr
+    from repair.metrics.base import Asked
+    from repair.metrics.registry import measure
+    from repair.outcome.record import record_of
+    from repair.search.search import search_f_ttr
+    from repair.solvers.registry import make_backend
+
+    config, asked = prepared.config, Asked(prepared, prepared.config.evasive)
+    found, capabilities = given, Capabilities()
+    wanted = list(config.metrics) if given is None else []
+    if found is None:
+        backend = make_backend(config.backend, config)
+        capabilities, at_ttr = backend.capabilities, config.driver == "at_ttr"
+        around = AtTtr(prepared.source, asked.evasive) if at_ttr else None
+        found = search_f_ttr(
+            around or prepared.source, prepared.conflict, backend, prepared.checker,
+            replace(config.search, time_limit=None), visits=around.visits if around else None,
+        )  # fmt: skip
+        wanted += ["ttr"] if at_ttr and "ttr" not in wanted else []
+    driven, t_end, reached = prepared.reference, prepared.t_reference, None
+    if found.curve is not None:
+        t_rep = float(found.f_ttr or 0.0)
+        driven, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
+        reached = prepared.checker.peaks(driven, t_end, t_rep)
+    states = prepared.checker.drive(driven, t_end).every(config.checker.substeps)
+    metrics = measure(wanted, asked) if wanted else {}
+    return record_of(prepared, found, states, reached, {}, metrics, capabilities)
+
+
+def differences(said: Any, made: Any, tolerance: float, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Where two plain values differ: the way there, and both; angles by what they are turned."""
+    if isinstance(said, Mapping) and isinstance(made, Mapping):
+        for key in [*made, *(k for k in said if k not in made)]:
+            if key not in _FREE:
+                inner = f"{path}.{key}" if path else str(key)
+                yield from differences(said.get(key, _Missing), made.get(key, _Missing), tolerance, inner)
+    elif isinstance(said, list) and isinstance(made, list):
+        if len(said) != len(made):
+            yield f"{path} (length)", len(said), len(made)
+        for i, (a, b) in enumerate(zip(said, made, strict=False)):
+            found = next(differences(a, b, tolerance, f"{path}[{i}]"), None)
+            if found is not None:
+                yield found
+                if not isinstance(a, Mapping):
+                    return  # one of a column is enough
+    elif _number(said) and _number(made):
+        off = abs(float(said) - float(made))
+        if path.partition("[")[0].endswith("_rad"):
+            off = abs((off + math.pi) % (2.0 * math.pi) - math.pi)
+        if not off <= tolerance * max(1.0, abs(float(made))):
+            yield path, said, made
+    elif said != made or isinstance(said, bool) != isinstance(made, bool):
+        yield path, said, made
+
+
+class _Missing:
+    """Stands for a key that is not there."""
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def record_rows(content: Mapping[str, Any], again: Again) -> list[CertificateRow]:
+    """One row for the whole record, and one for the first difference in each of its keys."""
+    direct = {key: again.direct[key] for key in _DIRECT if key in again.direct}
+    found = list(differences({key: content.get(key, _Missing) for key in direct}, direct, _EXACT))
+    found += _by_the_probes(content, again.direct)
+    rest: list[tuple[str, Any, Any]] = []
+    if again.record is not None and not again.limited:
+        made = {key: value for key, value in again.record.items() if key not in direct}
+        told = {key: value for key, value in content.items() if key not in direct}
+        rest = list(differences(told, made, _SOLVED))
+    elif again.record is not None:  # what had been found when it ended
+        visited = {p["t_rep_s"]: p for p in again.record["probes"]}
+        for i, probe in enumerate(content.get("probes") or []):
+            same = visited.get(probe.get("t_rep_s"))
+            if same is not None and probe.get("solver_status") != "time_limit":
+                rest += differences(probe, same, _SOLVED, f"probes[{i}]")
+    claim = not again.other
+    rows = [_differs(*one) for one in _firsts([*found, *(rest if claim else [])])]
+    count = len(found) + (len(rest) if claim else 0)
+    rows.append(equal("record: differences", count, 0, "searched again" if claim else "recomputed"))
+    if again.other:
+        remark = f"{len(rest)} differences; {again.other}" if again.record is not None else again.other
+        rows.append(said("search repeated", not rest, "searched again", remark, claim=False))
+    return rows
+
+
+def _firsts(found: list[tuple[str, Any, Any]]) -> list[tuple[str, Any, Any]]:
+    """The first difference in each key of the record."""
+    first: dict[str, tuple[str, Any, Any]] = {}
+    for one in found:
+        first.setdefault(one[0].partition(".")[0].partition("[")[0], one)
+    return list(first.values())[:_SHOWN]
+
+
+def _differs(path: str, said: Any, made: Any) -> CertificateRow:
+    numbers = [float(v) if _number(v) else math.nan for v in (said, made)]
+    words = "" if all(math.isfinite(v) for v in numbers) else f"says {_short(said)}, is {_short(made)}"
+    return CertificateRow(
+        f"record: {path}", numbers[0], numbers[1], numbers[1] - numbers[0], False, "recomputed", words
+    )
+
+
+def _short(value: Any) -> str:
+    text = "nothing" if value is _Missing or value is None else str(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _by_the_probes(content: Mapping[str, Any], made: Mapping[str, Any]) -> list[tuple[str, Any, Any]]:
+    """Without a search: status, F-TTR and manoeuvre as the conflict and the visited times have them."""
+    status = "no_conflict" if made["ttc_s"] is None else "found"
+    found: list[tuple[str, Any, Any]] = []
+    if content.get("status") != status:
+        found.append(("status", content.get("status"), status))
+    feasible = [p for p in content.get("probes") or [] if p.get("feasible")]
+    last: Any = max(feasible, key=lambda p: p["t_rep_s"], default={})
+    for key, inner in (("f_ttr_s", "t_rep_s"), ("maneuver", "maneuver")):
+        if content.get(key) != last.get(inner):
+            found.append((key, content.get(key), last.get(inner)))
+    return found

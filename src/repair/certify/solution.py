@@ -1,0 +1,199 @@
+"""The solution file: what it is for, where it starts, whether the curve drives it; the official answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.certify.certificate import STATE_TOLERANCE, TOLERANCE, CertificateRow, at_most, equal, said
+from repair.certify.motion import Motion, States, states_of, wrapped
+from repair.errors import RepairError
+from repair.io.official import OfficialVerdict, check_solution_file
+
+if TYPE_CHECKING:
+    from repair.vehicle.parameters import Vehicle
+
+__all__ = [
+    "agreement_rows",
+    "columns_row",
+    "form_rows",
+    "goal_row",
+    "official_rows",
+    "only_states",
+    "start_rows",
+]
+
+#: Of the first state from the planning problem's: [m], [rad], [m/s].
+START = (1e-3, 1e-2, 1e-2)
+
+
+def only_states(solution: Any, file: str) -> tuple[Any, States]:
+    """The one problem's part of a solution, and its states.
+
+    Raises
+    ------
+    RepairError
+        If it has not exactly one, or its states are not those of the KS model.
+    """
+    parts = solution.planning_problem_solutions
+    if len(parts) != 1:
+        raise RepairError(f"{file} solves {len(parts)} planning problems; a result has one")
+    try:
+        return parts[0], states_of(parts[0].trajectory.state_list)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise RepairError(f"{file} has no states of the KS model: {error}") from error
+
+
+def form_rows(
+    solution: Any,
+    part: Any,
+    states: States,
+    steps: tuple[int, int],
+    scenario_id: str,
+    problem_id: int,
+    vehicle: Vehicle,
+) -> list[CertificateRow]:
+    """Which scenario, planning problem, vehicle and model the solution is for, and over which time steps.
+
+    Parameters
+    ----------
+    solution, part
+        The file's content, and the part of its one planning problem.
+    states : States
+        Of that part.
+    steps : tuple of int
+        First and last one that there have to be.
+    scenario_id, problem_id, vehicle
+        What the result is for.
+    """
+    first, last = steps
+    same = str(getattr(solution, "scenario_id", "")) == scenario_id
+    expected = np.arange(first, last + 1, dtype=np.float64)
+    rows = [
+        equal("solution: planning problem", part.planning_problem_id, problem_id, "files"),
+        equal("solution: vehicle type", part.vehicle_type.value, vehicle.type_id, "files"),
+        said("solution: vehicle model KS", part.vehicle_model.name == "KS", "files"),
+        said("solution: scenario", same, "files"),
+        equal("solution: states", len(states.steps), len(expected), "files"),
+        said("solution: time steps", np.array_equal(states.steps, expected), "files"),
+    ]
+    if all(row.ok for row in rows):  # one row for what is as it has to be
+        remark = "states; scenario, planning problem, vehicle, model"
+        count = float(len(expected))
+        rows = [CertificateRow("solution: form", count, count, 0.0, True, "files", remark)]
+    return rows
+
+
+def start_rows(states: States, problem: Any, vehicle: Vehicle) -> list[CertificateRow]:
+    """By how much the first state is off the planning problem's.
+
+    Its speed is that of the rear axle, or that of the middle: CommonRoad does not say of which the planning
+    problem's is.
+    """
+    initial = problem.initial_state
+    position = np.asarray(initial.position, dtype=np.float64)[:2]
+    off = float(np.hypot(*(states.xy[0] - position)))
+    turned = abs(float(wrapped(states.orientation[0] - _middle(initial.orientation))))
+    slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(states.steering[0]))
+    speeds = np.array([states.speed[0], states.speed[0] / np.cos(slip)])
+    faster = float(np.abs(speeds - _middle(initial.velocity)).min())
+    return [
+        at_most("start: position off by", off, START[0], "files", "m"),
+        at_most("start: orientation off by", turned, START[1], "files", "rad"),
+        at_most("start: speed off by", faster, START[2], "files", "m/s"),
+    ]
+
+
+def _middle(value: Any) -> float:
+    return float((value.start + value.end) / 2.0 if hasattr(value, "start") else value)
+
+
+def goal_row(part: Any, problem: Any) -> CertificateRow:
+    """CommonRoad's own ``goal_reached`` on the states of the file; a repair need not reach it."""
+    try:
+        reached = bool(problem.goal_reached(part.trajectory)[0])
+    except Exception:  # goals that commonroad-io cannot judge
+        reached = False
+    return CertificateRow(
+        "goal reached", float(reached), 1.0, float(reached) - 1.0, True, "official", "", claim=False
+    )
+
+
+def agreement_rows(
+    states: States, motion: Motion, vehicle: Vehicle, dt: float, first: int
+) -> list[CertificateRow]:
+    """By how much the file's states differ from the vehicle driven along the curve."""
+    times = (states.steps - first) * dt
+    times = np.clip(times, motion.t[0], motion.t[-1])
+    x, y, psi, v, theta = (
+        np.interp(times, motion.t, column) for column in (*motion.poses.T, motion.speed, motion.heading)
+    )
+    slip = theta - psi
+    steering = np.arctan(vehicle.wheelbase / vehicle.rear * np.tan(slip))
+    place = float(np.max(np.abs(np.stack([x, y], axis=1) - states.xy)))
+    tolerance = STATE_TOLERANCE
+    return [
+        at_most("solution file against the curve", place, tolerance, "sampled", "m"),
+        at_most(
+            "solution: orientation", _most(wrapped(psi - states.orientation)), tolerance, "sampled", "rad"
+        ),
+        at_most("solution: speed", _most(v * np.cos(slip) - states.speed), tolerance, "sampled", "m/s"),
+        at_most("solution: steering", _most(steering - states.steering), 2 * tolerance, "sampled", "rad"),
+    ]
+
+
+def columns_row(states: States, trajectory: Mapping[str, Any]) -> CertificateRow:
+    """By how much the columns of ``trajectory`` in ``result.json`` differ from the file's states."""
+    name = "record: trajectory against the file"
+    try:
+        told = states_of(trajectory)
+    except (KeyError, AttributeError, TypeError, ValueError) as error:
+        return said(name, False, "files", f"it is incomplete: {error}")
+    if len(told.steps) != len(states.steps) or not (told.steps == states.steps).all():
+        return said(name, False, "files", f"{len(told.steps)} states, and {len(states.steps)} in the file")
+    off = (
+        told.xy - states.xy,
+        wrapped(told.orientation - states.orientation),
+        told.speed - states.speed,
+        told.steering - states.steering,
+    )
+    return at_most(name, max(_most(values) for values in off), TOLERANCE, "files", "", 0.0)
+
+
+def _most(values: Array) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def official_rows(
+    file: Path, scenario: Any, problem: Any, *, on_road: bool, gap: float
+) -> list[CertificateRow]:
+    """The three answers of the drivability checker.
+
+    Parameters
+    ----------
+    scenario, problem
+        CommonRoad objects, with the traffic that counts.
+    on_road : bool
+        What was found here.
+    gap : float
+        Gaps of the map that were closed for that [m].
+    """
+    from commonroad.planning.planning_problem import PlanningProblemSet
+
+    problems = PlanningProblemSet([problem])
+    verdict: OfficialVerdict = check_solution_file(file, scenario, problems)
+    rows = [
+        said("solution_feasible", verdict.feasible, "official"),
+        said("obstacle_collision", verdict.collision_free, "official"),
+    ]
+    name = f"boundary_collision ({verdict.road_method})"
+    if on_road and not verdict.on_road and gap > 0.0:
+        remark = f"differs: gaps of the map up to {gap:g} m are road here"
+        rows.append(said(name, False, "official", remark, claim=False))
+    else:
+        rows.append(said(name, verdict.on_road, "official"))
+    return rows

@@ -1,0 +1,132 @@
+"""Where every shape of the traffic is at every sample, ready to be compared with the ego's poses.
+
+Each sample stands for the time half way to its neighbours. Columns are tracks: a shape of an obstacle each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.arrays import Array, Points, wrap
+from repair.world.tracks import (
+    MOVING,
+    RECTANGLE,
+    Index,
+    Track,
+    as_complex,
+    block_samples,
+    tracks_of,
+)
+
+if TYPE_CHECKING:
+    from repair.scene.traffic.obstacle import Obstacle
+
+__all__ = ["TrackTable"]
+
+# Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
+_SPARE = 1e-3
+
+
+class TrackTable:
+    """Every shape's pose, its size, and how far it moves half way to the next sample.
+
+    Circles and polygons have the size of their circumcircle.
+
+    Parameters
+    ----------
+    obstacles : sequence of Obstacle
+        Arrays of a row for each scenario step.
+    n_samples, substeps : int
+        Samples in all, and to a scenario step.
+    radius : float
+        Of the ego's circumcircle [m].
+
+    Attributes
+    ----------
+    tracks : list of Track
+    owner : list of int
+        Index of each track's obstacle.
+    kind, mode : (M,) int array
+        Of the tracks, as :mod:`repair.world.tracks` names them.
+    shapes : (3, n_samples * M) complex array
+        Centre, and from there to two corners [m].
+    axis, size, heading : (n_samples * M,) array
+        Direction (complex), half length and half width (complex) [m], and angle [rad].
+    slack : (n_samples * M,) array
+        How far any point of the shape moves half way to the next sample, or the one before [m].
+    share : (M,) array
+        How much of the ego's way to its neighbours a sample answers for.
+    any_round : bool
+        Not every shape is a rectangle.
+    """
+
+    def __init__(self, obstacles: Sequence[Obstacle], n_samples: int, substeps: int, radius: float) -> None:
+        self.n_samples, self._block = n_samples, 2 * substeps
+        self.tracks: list[Track] = []
+        self.owner: list[int] = []
+        for index, obstacle in enumerate(obstacles):
+            for track in tracks_of(obstacle, n_samples, substeps):
+                self.tracks.append(track)
+                self.owner.append(index)
+        self._build(radius)
+
+    def _build(self, own_radius: float) -> None:
+        tracks = self.tracks
+        stacked = np.stack([t.rows for t in tracks], axis=1) if tracks else np.empty((self.n_samples, 0, 5))
+        self.kind = np.array([t.kind for t in tracks], dtype=np.intp)
+        self.mode = np.array([t.mode for t in tracks], dtype=np.intp)
+        x, y, heading, *size = np.moveaxis(stacked, 2, 0)
+        # Points and directions of the plane as complex numbers: one call where coordinates take two.
+        centre = as_complex(x, y)
+        axis = as_complex(np.cos(heading), np.sin(heading))
+        diagonal = as_complex(*size)
+        self.shapes = np.stack((centre, axis * diagonal, axis * diagonal.conj())).reshape(3, -1)
+        self.axis, self.size, self.heading = axis.ravel(), diagonal.ravel(), heading.ravel()
+        rectangle = self.kind == RECTANGLE
+        radius = np.where(rectangle, np.hypot(*size), size[0])
+        self.any_round = bool((~rectangle).any())
+        turned = np.abs(wrap(np.diff(heading, axis=0))) * np.where(rectangle, np.hypot(*size), 0.0)[1:]
+        grown = np.maximum(np.abs(np.diff(size[0], axis=0)), np.abs(np.diff(size[1], axis=0)))
+        moved = np.nan_to_num(0.5 * (np.abs(np.diff(centre, axis=0)) + turned + grown))
+        moved[:, self.mode != MOVING] = 0.0
+        none = np.zeros((1, len(tracks)))
+        slack = np.maximum(np.concatenate((none, moved)), np.concatenate((moved, none)))
+        self.slack = slack.ravel()
+        # How much of the ego's way to its neighbours a sample answers for; held shapes change at a step.
+        self.share = np.array([1.0, 1.0, 1.0, 0.0])[self.mode] * np.where(self.mode == MOVING, 0.5, 1.0)
+        self._build_blocks(centre, radius + slack + own_radius)
+
+    def _build_blocks(self, centre: Points, reach: Array) -> None:
+        """A circle around each track over each block of samples, what the ego needs included."""
+        size = self._block
+        count = -(-self.n_samples // size)
+        padded = np.full((3, count * size, len(self.kind)), np.nan)
+        padded[:, : self.n_samples] = centre.real, centre.imag, reach
+        x, y, padded_reach = padded.reshape(3, count, size, -1)
+        # fmin and fmax pass over the samples at which an obstacle is not there
+        middle = [0.5 * (np.fmin.reduce(v, axis=1) + np.fmax.reduce(v, axis=1)) for v in (x, y)]
+        self._block_centre = as_complex(*middle)
+        away = np.hypot(x - middle[0][:, None], y - middle[1][:, None])
+        self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
+
+    def near(self, here: Points, start: int, step: float, margin: complex) -> tuple[Index, Index]:
+        """The ego's samples, and the shapes' rows there (n,), outside of which nothing touches; in no order.
+
+        One look per block: within it no sample, and nothing half way to the next one, is farther than half a
+        block and a sample from the one in its middle.
+        """
+        size, stop = self._block, start + len(here)
+        blocks = slice(start // size, -(-stop // size))
+        middle, samples, rows = block_samples(start, stop, size, len(self.kind))
+        away = np.abs(self._block_centre[blocks] - here.take(middle))
+        away -= (size // 2 + 1) * step + abs(margin)
+        block, track = (away <= self._block_reach[blocks]).nonzero()
+        return samples.take(block, axis=0).ravel(), rows.take(block, axis=0).ravel() + track.repeat(size)
+
+    def everything(self, count: int, start: int) -> tuple[Index, Index]:
+        """As :meth:`near`, nothing left out."""
+        ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
+        return ego, (ego + start) * len(self.kind) + track
