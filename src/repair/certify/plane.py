@@ -15,7 +15,7 @@ from repair.errors import RepairError
 from repair.timegrid import INSTANT, steps_until
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
 
 __all__ = ["official_rows", "plane_rows"]
 

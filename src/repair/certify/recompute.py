@@ -23,7 +23,7 @@ from repair.errors import RepairError
 from repair.io.result_json import read_record
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
 
 __all__ = ["certify"]
 
@@ -70,7 +70,7 @@ def certify(folder: Path) -> Certificate:
 def _prepare(folder: Path, content: Mapping[str, Any]) -> Prepared:
     """The scenario of the result, loaded and laid out again."""
     from repair.config.load import recorded_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
 
     origin = content.get("provenance") or {}

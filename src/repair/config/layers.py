@@ -127,5 +127,7 @@ def explain(layer: str, error: Exception, known: Collection[str]) -> str:
 
         close = difflib.get_close_matches(key, sorted(known), n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
+        if key in known:  # in a file its parts are sections
+            hint = "; write each part of the name as a mapping of its own"
         return f"{layer}: there is no configuration key {key!r}{hint}"
     return f"{layer}: configuration key {key!r}: {message}" if key else f"{layer}: {message}"

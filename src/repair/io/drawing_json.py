@@ -85,9 +85,35 @@ def drawing_from(content: Mapping[str, Any]) -> Drawing:
         areas=tuple(_array(x, 2) for x in content["areas"]),
         edges=tuple(_array(x, 2) for x in content["edges"]),
     )  # fmt: skip
+    _require_whole(drawing)
+    return drawing
+
+
+def _require_whole(drawing: Drawing) -> None:
+    """Refuse what could not be drawn.
+
+    Raises
+    ------
+    ValueError
+        Saying what is wrong.
+    """
     if not drawing.steps or not drawing.lines:
         raise ValueError("it has no lines")
-    return drawing
+    columns = [
+        *([getattr(x, name) for name in _COLUMNS] for x in drawing.lines),
+        *([x.t, x.low, x.high] for x in drawing.boxes),
+    ]
+    if any(len({len(column) for column in one}) > 1 for one in columns):
+        raise ValueError("the columns of a line or a box differ in length")
+    if any(not len(one[0]) or not np.isfinite(one[0]).all() for one in columns):
+        raise ValueError("a line or a box lacks times")
+    outlines = [outline for x in drawing.bodies for outline in x.outlines.values()]
+    shapes = [drawing.ego, drawing.body, *outlines, *drawing.areas, *drawing.edges]
+    if any(not len(shape) or not np.isfinite(shape).all() for shape in shapes):
+        raise ValueError("a shape lacks points")
+    placed = drawing.unrepaired
+    if placed is not None and (len(placed) != 3 or not np.isfinite(placed).all()):
+        raise ValueError("the ego has no place at the conflict")
 
 
 def _rows(values: Array) -> list[list[float | None]]:

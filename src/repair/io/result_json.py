@@ -47,7 +47,11 @@ def read_record(folder: Path) -> dict[str, Any]:
         raise RepairError(f"{folder} holds no {RESULT_FILE}") from error
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise RepairError(f"{file} cannot be read: {error}") from error
-    if not isinstance(content, dict) or "status" not in content or "config" not in content:
+    if (
+        not isinstance(content, dict)
+        or "status" not in content
+        or not isinstance(content.get("config"), dict)
+    ):
         raise RepairError(f"{file} is not the result of a repair")
     return content
 

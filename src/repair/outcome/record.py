@@ -16,7 +16,7 @@ from repair.check.peaks import Peaks
 from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
-from repair.prepare import Prepared
+from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
 from repair.search.result import Probe, SearchResult

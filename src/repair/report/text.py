@@ -45,7 +45,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))
-    if content["metrics"]:
+    if content.get("metrics"):  # results of earlier versions have none
         rows.append(("Metrics", _metrics(content["metrics"])))
     lines = [f"{name:9} {text}" for name, text in rows]
     if not content["complete"]:
