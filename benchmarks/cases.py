@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks import literal
 from repair.config import load_config
 from repair.paper.synthetic import write_scenario
-from repair.prepare import Prepared, prepare
+from repair.preparation import Prepared, prepare
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import Scene
 from repair.search.result import SearchResult

@@ -93,7 +93,7 @@ def prepared(files: list[Path], backends: list[str]) -> Iterator[tuple[Any, Any,
     """Situations with a conflict, and their backends."""
     import repair
     from repair.config import load_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
     from repair.solvers.registry import make_backend
 

@@ -657,7 +657,6 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
     bounds = bounds_of(problem, ego)
     weights, again = ego.deform, ego.refine
     costs: list[Any] = []
-
     usual = minimiser(ego)
 
     def spy(cost: Any, *arguments: Any, **keys: Any) -> Any:
@@ -686,7 +685,7 @@ def cost_times(problem: RepairProblem, config: Any) -> dict[str, float]:
 def main(path: str, preset: str = "scenario_1") -> None:
     """Print the times of the literal transcription and of the package."""
     from repair.config import load_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
     from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend

@@ -114,8 +114,9 @@ def peak():
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 import numpy
 numpy_only = peak()
-from repair.api import prepare, search
+from repair.api import search
 from repair.config import load_config
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.solvers.registry import make_backend
 name, *overrides = json.loads(sys.argv[2])

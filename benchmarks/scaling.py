@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks import literal
 from benchmarks.cases import Case, Context, case, chosen_problem, scene_of
 from benchmarks.measure import Report, Spread, Target, exponent, row, together
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.traffic.obstacle import Obstacle
 from repair.solvers.registry import make_backend
 
@@ -31,7 +31,7 @@ def control_points(context: Context) -> Report:
     slow: dict[int, Callable[[], Any]] = {}
     for n in POINTS:
         config = replace(base.config, repair=replace(base.config.repair, spacing=duration / (n - 3) + 1e-7))
-        prepared = replace(base.prepared, config=config)
+        prepared = replace(base.prepared, settings=config.repair, config=config)
         made = Case(prepared, make_backend("ego", config), config)
         problem = chosen_problem(made)
 

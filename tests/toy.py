@@ -69,4 +69,5 @@ def problem(boxes, *, t_rep=0.0, t_end=4.0, v0=10.0, bounds=WIDE, lateral=True, 
         curvature=frozen([0.0, 0.0]),
         dt=DT,
         lateral=lateral,
+        half_length=2.15,
     )

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from repair.io.result_json import load_result
     from repair.metrics.registry import register as register_metric
     from repair.outcome.data import Outcome
-    from repair.prepare import Prepared, prepare
+    from repair.preparation import Prepared, prepare
     from repair.problem.problem import Maneuver, RepairProblem
     from repair.reference.registry import register as register_reference
     from repair.save import register as register_format
@@ -115,7 +115,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         "ScenarioError",
     ),
     "repair.outcome.data": ("Outcome",),
-    "repair.prepare": ("Prepared", "prepare"),
+    "repair.preparation": ("Prepared", "prepare"),
     "repair.io.result_json": ("load_result",),
     "repair.problem.problem": ("Maneuver", "RepairProblem"),
     "repair.scene.commonroad": ("load_scene", "scene_from_scenario"),

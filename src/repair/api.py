@@ -25,7 +25,7 @@ from repair.metrics.registry import measure
 from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
 from repair.outcome.record import driven_curve
-from repair.prepare import Phases, Prepared, prepare
+from repair.preparation import Phases, Prepared, prepare
 from repair.save import Saved, saved
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import Scene

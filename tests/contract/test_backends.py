@@ -10,7 +10,7 @@ from tests import toy
 from tests.contract import problems
 
 from repair.arrays import frozen
-from repair.backend.base import SolveResult, SolveStatus
+from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import load_config
 from repair.curves.bspline import UniformBSpline
@@ -19,8 +19,7 @@ from repair.errors import BackendError
 from repair.search.result import SearchStatus
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
-from repair.solvers import registry
-from repair.solvers.registry import available, backend_names, make_backend, register
+from repair.solvers.registry import BACKENDS, available, backend_names, make_backend, register
 
 HARD = ("casadi-ipopt", "casadi-sqpmethod", "casadi-ipopt-sampled")
 _OVERRIDES = {
@@ -151,6 +150,9 @@ class _Source:
         boxes = [toy.box((30.0, 40.0), (-2.0, 2.0))]
         return (problems.forced(toy.problem(boxes, t_rep=t_rep, t_end=6.0, lateral=False)),)
 
+    def relaxed(self, t_rep):
+        return ()
+
 
 class _Checker:
     def check(self, problem, curve):
@@ -162,6 +164,7 @@ class _Braking:
     """A fourth backend: full braking, nothing else."""
 
     name = "toy"
+    capabilities = Capabilities()
 
     def solve(self, problem, *, warm_start=None, time_limit=None):
         stop = problem.passing.guide
@@ -181,11 +184,16 @@ class _Interpolated:
         return replace(known, t=t, position=values[0], velocity=values[1], acceleration=zero, jerk=zero)
 
 
-def test_a_fourth_backend_needs_one_line(monkeypatch):
-    monkeypatch.setattr(registry, "_EXTRA", {})
+@pytest.fixture
+def fourth():
     register("toy", lambda config: _Braking())
-    assert "toy" in backend_names()
-    backend = make_backend("toy", load_config())
+    yield "toy"
+    BACKENDS.unregister("toy")
+
+
+def test_a_fourth_backend_needs_one_line(fourth):
+    assert fourth in backend_names()
+    backend = make_backend(fourth, load_config())
     found = search_f_ttr(_Source(), Conflict(3.0, "margin"), backend, _Checker(), SearchConfig(delta_t=0.4))
     assert found.status is SearchStatus.FOUND
     # 30 m at 10 m/s, less 6.25 m of braking and what the fitted spline needs for the step of acceleration
@@ -214,7 +222,31 @@ def test_a_hard_backend_shows_the_curve_that_comes_closest():
     assert solve.status is SolveStatus.INFEASIBLE
     assert solve.curve is None
     assert solve.residuals["obstacles"] > 0.0
-    assert solve.stages["closest"].t_start == pytest.approx(problem.t_rep)
+    assert isinstance(solve.closest, Closest)
+    assert solve.closest.curve.t_start == pytest.approx(problem.t_rep)
+    # How far it is from stopping in time: where it stops, measured from outside.
+    stop = solve.closest.curve.sample(np.arange(problem.t_rep, problem.t_end, 1e-3)).position[:, 0].max()
+    assert solve.closest.miss == pytest.approx(problem.margin + stop - 5.0, abs=0.01)
+
+
+def test_who_solves_comes_closest_to_nothing(variant):
+    for make in problems.FEASIBLE.values():
+        solve = backend_of(variant).solve(make())
+        assert solve.curve is None or solve.closest is None
+
+
+def test_every_backend_says_what_it_is_able_to_do(variant):
+    backend = backend_of(variant)
+    assert isinstance(backend.capabilities, Capabilities)
+    assert backend.capabilities.relaxes == backend.capabilities.keeps_hull == (variant in HARD)
+    assert backend.name == VARIANTS[variant][0]
+
+
+def test_who_keeps_the_hull_says_how_far_it_is_from_the_obstacles(variant):
+    """As ``Capabilities.keeps_hull`` promises; the certificate relies on it."""
+    backend, problem = backend_of(variant), problems.static_block()
+    if backend.capabilities.keeps_hull:
+        assert backend.solve(problem).residuals["obstacles"] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("strict", [False, True])
@@ -224,6 +256,9 @@ def test_the_checker_may_accept_the_closest_curve_unless_the_problem_is_strict(s
     class Source:
         def at(self, t_rep):
             return (problem,)
+
+        def relaxed(self, t_rep):
+            return ()
 
     class Lenient:
         def check(self, problem, curve):

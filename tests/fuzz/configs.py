@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import yaml
 
-from repair.config import CHOICES, RANGES
+from repair.config.schema import configuration_keys, words_of
+
+KEYS = configuration_keys()
+WORDS = {key.name: words for key in KEYS if (words := words_of(key))}
+LISTS = {key.name for key in KEYS if isinstance(key.default, list)}
+RANGES = {key.name: key for key in KEYS if key.setting.low is not None and key.setting.high is not None}
+# These need something else that goes with them.
+NOT_ALONE = ("reference.source", "casadi.solver")
 
 ODD_CONFIG = (
     "nan", ".nan", ".inf", "-.inf", "null", "~", "true", "[]", "{}", "[1, 2]", "{a: {b: [c]}}", "''", "text",
@@ -21,9 +29,7 @@ def config_text(rng: random.Random, name: str) -> bytes:
     if name == "extremes":
         return yaml.safe_dump(_nested(dict(_extreme(rng) for _ in range(rng.randrange(1, 4))))).encode()
     if name == "types":
-        keys = rng.sample(
-            [*RANGES, *CHOICES, "seed", "backend", "scenario", "for_backend", "search", "nothing.here"], 2
-        )
+        keys = rng.sample([*(key.name for key in KEYS), "search", "nothing.here", "seed"], 2)
         lines = []
         for key in keys:
             *sections, last = key.split(".")
@@ -35,30 +41,26 @@ def config_text(rng: random.Random, name: str) -> bytes:
 
 def _extreme(rng: random.Random) -> tuple[str, object]:
     if rng.random() < 0.2:
-        key = rng.choice(
-            [k for k in sorted(CHOICES) if k not in ("driver", "reference.source", "casadi.solver")]
-        )
-        return key, rng.choice(CHOICES[key])
-    key = rng.choice([k for k in sorted(RANGES) if not k.startswith(("casadi", "qptr", "evasive"))])
-    low, high = RANGES[key]
-    whole = float(low).is_integer() and float(high).is_integer() and key in _WHOLE
+        name = rng.choice([k for k in sorted(WORDS) if k not in NOT_ALONE])
+        word = rng.choice(WORDS[name])
+        return name, [word] if name in LISTS else word
+    name = rng.choice([k for k in sorted(RANGES) if not k.startswith(("casadi", "qptr"))])
+    key = RANGES[name]
+    low, high = key.setting.low, key.setting.high
+    assert low is not None
+    assert high is not None
     value = rng.choice([low, high, low + 0.1 * (high - low), low + 0.01 * (high - low)])
-    return key, int(value) if whole else float(value)
-
-
-_WHOLE = {"repair.degree", "ego.max_iterations", "ego.rebounds", "checker.substeps"}
+    return name, int(value) if key.type.startswith("int") else float(value)
 
 
 def _nested(flat: dict[str, object]) -> dict[str, object]:
-    made: dict[str, object] = {}
+    made: dict[str, Any] = {}
     for key, value in flat.items():
-        section, _, last = key.partition(".")
-        if last:
-            inner = made.setdefault(section, {})
-            assert isinstance(inner, dict)
-            inner[last] = value
-        else:
-            made[section] = value
+        *sections, last = key.split(".")
+        inner = made
+        for section in sections:
+            inner = inner.setdefault(section, {})
+        inner[last] = value
     return made
 
 

@@ -136,7 +136,7 @@ def run_case(case: Case, rng: random.Random, folder: Path) -> tuple[str, str]:
     from repair.config import load_config
     from repair.errors import ConfigError, RepairError
     from repair.io.result_json import to_json
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
     from repair.solvers.registry import make_backend
 
@@ -146,9 +146,7 @@ def run_case(case: Case, rng: random.Random, folder: Path) -> tuple[str, str]:
     except RepairError as error:
         return _judged(error, None)
     try:
-        scene = load_scene(case.scenario, planning_problem=config.scene.planning_problem,
-                           vehicle=config.scene.vehicle, horizon=config.scene.horizon,
-                           after_prediction=config.scene.after_prediction)  # fmt: skip
+        scene = load_scene(case.scenario, config)
     except ConfigError as error:
         return _judged(error, None)
     except RepairError as error:
@@ -177,6 +175,7 @@ def _judged(error: Exception, name: str | None) -> tuple[str, str]:
 
 def _saved(result: Any, rng: random.Random, folder: Path) -> str:
     """Save; sometimes with a disk that fills up. Returns what is wrong with what is there then."""
+    from repair import load_result
     from repair.errors import OutputError
 
     figure, full = rng.random() < 0.05, rng.random() < 0.4
@@ -200,7 +199,9 @@ def _saved(result: Any, rng: random.Random, folder: Path) -> str:
     there = sorted(folder.iterdir())
     if there != sorted(written):
         return f"written {written}, but there is {there}"
-    json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    content = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    if load_result(folder).record != content:
+        return "what is read back is not what is in result.json"
     return ""
 
 

@@ -14,7 +14,7 @@ from repair.api import RepairResult, search
 from repair.check.checker import Checker
 from repair.config import load_config
 from repair.errors import RepairError
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend

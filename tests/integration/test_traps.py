@@ -15,12 +15,11 @@ from tests.roads import ROAD, SLOW, car, driving, exact, lanelet, point, problem
 from repair.api import RepairResult, repair, search
 from repair.config import load_config
 from repair.errors import ConfigError, OutputError, ReferenceTrajectoryError, RepairError, ScenarioError
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import Scene
 from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
-from repair.world.late import official_shifts
 
 CONFIG = load_config()
 
@@ -120,11 +119,10 @@ def test_problem_without_a_goal(trap: Any) -> None:
 @pytest.mark.parametrize("name", ["ZAM_Urban-3_3_Repair.xml", "ZAM_Zip-2_1_T-1.xml"])
 def test_prediction_from_the_initial_step_on_is_not_late(trap: Any, name: str) -> None:
     scene = trap(name)
-    late = official_shifts(scene.scenario)  # the drivability checker is, and is therefore asked as well
     moving = [o for o in (*scene.obstacles, scene.recorded_ego) if o is not None and o.role == "dynamic"]
     assert moving
     for obstacle in moving:
-        assert late[obstacle.id] == 1
+        assert obstacle.late == 1  # the drivability checker is, and is therefore asked as well
         recorded = scene.scenario.obstacle_by_id(obstacle.id)
         for k in (0, 1, 5, 20):
             np.testing.assert_allclose(obstacle.states[k, :2], recorded.state_at_time(k).position)
@@ -495,7 +493,9 @@ def test_solution_files(found: RepairResult, tmp_path: Path) -> None:
         ("search: {delta_t: [1]}", "'search.delta_t'"),
         ("- 1", "mapping"),
         ("search: {delt: 1}", "'search.delt'"),
-        ("scene: {vehicle: car}", "'scene.vehicle'"),
+        ("scene: {vehicle: [1]}", "'scene.vehicle'"),
+        ("scene: {vehicle: {car: 1}}", "'scene.vehicle'"),
+        ("scene: {vehicle: }", "'scene.vehicle'"),
         ("search: {delta_t: .nan}", "'search.delta_t'"),
         ("a: ${", "."),
         ("repair: {relax: [[1]]}", "'repair.relax'"),
@@ -510,6 +510,14 @@ def test_configuration_of_the_wrong_type(tmp_path: Path, text: str, sentence: st
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=sentence):
         load_config(file=path)
+
+
+@pytest.mark.parametrize("vehicle", ["car", "FORD", "0", "9", "-1", "''"])
+def test_a_vehicle_that_nobody_knows(load: Any, vehicle: str) -> None:
+    """Any word may be the name of a vehicle that is registered; this one is not."""
+    config = load_config(overrides=[f"scene.vehicle={vehicle}"])
+    with pytest.raises(ConfigError, match=r"vehicle.*FORD_ESCORT"):
+        load(scenario(), config=config)
 
 
 def test_settings_that_do_not_fit_the_scenario(found: RepairResult) -> None:

@@ -20,7 +20,7 @@ from tests.roads import bend
 from repair.api import RepairResult, search
 from repair.config import Config, load_config
 from repair.errors import RepairError
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import scene_from_scenario
 from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
@@ -189,7 +189,7 @@ def cases(draw: st.DrawFn) -> tuple[Any, list[Thing], Config]:
 
 def scene_or_none(scenario: Any, task: Any, config: Config) -> Any:
     try:
-        return scene_from_scenario(scenario, task, vehicle=config.scene.vehicle)
+        return scene_from_scenario(scenario, task, config)
     except RepairError:
         return None
 

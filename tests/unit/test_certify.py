@@ -10,6 +10,7 @@ import pytest
 from repair.api import repair
 from repair.certify.certificate import Certificate, CertificateRow, format_certificate
 from repair.certify.recompute import certify
+from repair.cli.command import main
 from repair.errors import RepairError
 
 
@@ -109,6 +110,61 @@ def test_a_kink_in_the_curve_is_found_out(folder):
 def test_what_cannot_be_certified_is_said(folder, edit, words):
     change(folder, edit)
     with pytest.raises(RepairError, match=words):
+        certify(folder)
+
+
+def of_an_earlier_version(content):
+    """No drawing, no metrics, no capabilities; a seed that nobody used."""
+    for name in ("metrics", "capabilities", "drawing_file"):
+        content.pop(name)
+    content["config"].pop("metrics")
+    content["config"]["scene"].pop("smoothing")
+    content["config"]["checker"].pop("extra")
+    content["config"]["seed"] = 0
+
+
+def test_a_result_of_an_earlier_version_is_certified_alike(written, folder):
+    change(folder, of_an_earlier_version)
+    (folder / "drawing.json").unlink()
+    assert certify(folder).rows == certify(written).rows
+    assert main(["certify", str(folder)]) == 0
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+def test_how_far_into_a_box_a_hard_repair_may_go_is_its_own_word(folder, earlier):
+    """And for a soft one, what hard ones are allowed at most."""
+
+    def relaxed(content):
+        content["config"]["repair"]["relax"] = [-0.5]
+        if earlier:
+            of_an_earlier_version(content)
+
+    def soft(content):
+        if earlier:
+            for probe in content["probes"]:
+                probe["residuals"].pop("obstacles")
+        else:
+            content["capabilities"]["keeps_hull"] = False
+
+    def limits():
+        rows = certify(folder).rows
+        return {row.limit for row in rows if row.name == "distance to the nearest inflated obstacle"}
+
+    change(folder, relaxed)
+    assert limits() == {0.0}
+    change(folder, soft)
+    assert limits() == {-0.5}
+
+
+def test_the_configuration_is_taken_as_it_was_written(folder):
+    """Nobody says again on purpose what stood in a file without an effect."""
+    change(folder, lambda content: content["config"]["reference"].update(obstacle_id=7))
+    assert certify(folder).ok
+
+
+def test_settings_that_there_are_not_any_more_are_named(folder):
+    change(folder, lambda content: content["config"].update(temper="mild"))
+    with pytest.raises(RepairError, match="'temper'"):
         certify(folder)
 
 

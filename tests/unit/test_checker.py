@@ -10,11 +10,12 @@ from tests import roads
 
 from repair.arrays import frozen
 from repair.check.checker import Checker
+from repair.check.limits import exceeded_by_peaks
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.world.occupancy import first_entry
 
@@ -49,7 +50,8 @@ def judged_in_full(checker, problem, curve):
     states = checker.drive(spliced, problem.t_end)
     late = slice(first, None)
     words = []
-    if checker._limits(checker._path(spliced, problem.t_end), int((times < problem.t_rep - 1e-9).sum()), 0.0):
+    late_from = int((times < problem.t_rep - 1e-9).sum())
+    if exceeded_by_peaks(checker.path(spliced, problem.t_end), late_from, checker.limits):
         words.append("limits")
     steps = times[:: checker.config.substeps]
     if first_entry(problem.occupancy, curve.sample(steps[steps >= problem.t_rep - 1e-9])) is not None:
@@ -57,7 +59,7 @@ def judged_in_full(checker, problem, curve):
     poses = states.x[late], states.y[late], states.orientation[late]
     if checker.world.contact(*poses, first) is not None:
         words.append("collision")
-    if not checker.road._inside(checker.road._outline(*poses)).all():
+    if not checker.road.inside(checker.road.outline(*poses)).all():
         words.append("off_road")
     return tuple(words)
 
@@ -84,7 +86,36 @@ def test_what_is_kept_of_one_reference_is_not_used_for_another(prepared):
     for asked in (problem, other, replace(problem, t_end=problem.t_end - 1.0), problem):
         fresh = Checker(prepared.scene, prepared.limits, prepared.checker.config)
         assert checker.check(asked, curve) == fresh.check(asked, curve)
-        assert checker._followed.reference is asked.reference
+
+
+def test_a_reference_is_followed_once(prepared):
+    """What is kept of it serves every repair that leaves it, until another one is asked about."""
+
+    class Counted:
+        def __init__(self, curve):
+            self.curve, self.asked = curve, 0
+            self.t_start, self.t_end = curve.t_start, curve.t_end
+
+        def sample(self, t):
+            self.asked += 1
+            return self.curve.sample(t)
+
+    checker = Checker(prepared.scene, prepared.limits, prepared.checker.config)
+    first, second = Counted(prepared.reference), Counted(fit_to_curve(prepared.reference, 0.0, 20, 3, 0.5))
+    problem = prepared.source.at(0.8)[0]
+    curve = next(curves(prepared, problem, 1, 0))
+    shorter = replace(problem, t_end=problem.t_end - 1.0)
+    counts = []
+    for asked, reference in (
+        (problem, first), (problem, first), (shorter, first), (problem, second), (problem, second),
+        (problem, first),
+    ):  # fmt: skip
+        checker.check(replace(asked, reference=reference), curve)
+        counts.append((first.asked, second.asked))
+    assert counts == [(1, 0), (1, 0), (1, 0), (1, 1), (1, 1), (2, 1)]
+    # From the start on nothing of it is looked at.
+    checker.check(replace(problem, t_rep=0.0, reference=second), next(curves(prepared, problem, 1, 0)))
+    assert second.asked == 1
 
 
 def test_times_are_the_scenario_steps_and_what_lies_between(prepared):

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import json
 import os
+import pkgutil
 import signal
 import subprocess
 import sys
 import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import repair
-from repair.backend.base import SolveResult
+from repair.backend.base import BackendSpec, SolveResult
 from repair.cli import command as cli
 from repair.cli.command import main
-from repair.config import Config
+from repair.config import Config, load_config
 from repair.problem.problem import RepairProblem
+from repair.settings import setting
 from repair.solvers import registry
 
 with warnings.catch_warnings():
@@ -87,7 +91,7 @@ def test_json_prints_what_the_file_holds_and_nothing_else(
     content = json.loads(out)
     assert content["provenance"]["kind"] == "reconstruction"
     assert content["figure_files"] == []
-    names = {"result.json", content["solution_file"], content["scenario_file"]}
+    names = {"result.json", content["solution_file"], content["scenario_file"], content["drawing_file"]}
     assert {p.name for p in (tmp_path / "out").iterdir()} == names
 
 
@@ -166,26 +170,47 @@ def test_a_solution_file_is_a_reference(
     assert "solution file result.json is not XML" in capsys.readouterr().err
 
 
+def test_what_has_no_effect_is_noted(scenario_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["run", str(scenario_file), "--preset", "scenario_1", "--set", "casadi.rounds=3", "ego.w_a=1.0"]
+    assert main(argv) == 0
+    out = capsys.readouterr().out
+    assert "casadi.rounds has no effect with backend=ego" in out
+    assert "ego.w_a has no effect" not in out
+    assert main([*argv, "--backend", "casadi", "--json"]) == 0
+    notes = json.loads(capsys.readouterr().out)["notes"]
+    assert [note for note in notes if "no effect" in note] == ["ego.w_a has no effect with backend=casadi"]
+
+
 # -- interrupts and pipes --------------------------------------------------------------------------
 
 
+@dataclass
+class CtrlC:
+    """Settings of the backend below."""
+
+    at: int = setting(3, "the solve during which Ctrl-C is pressed", low=1, high=9)
+
+
 @pytest.fixture
-def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A backend `ctrl-c`: the soft one, but the user presses Ctrl-C during the third solve."""
+def interrupted() -> Iterator[None]:
+    """A backend `ctrl_c`: the soft one, but the user presses Ctrl-C during one of its solves."""
 
     class Interrupted:
-        name = "ctrl-c"
+        name = "ctrl_c"
 
         def __init__(self, config: Config) -> None:
             self.inner, self.calls = registry.make_backend("ego", config), 0
+            self.capabilities, self.at = self.inner.capabilities, config.section("ctrl_c").at
 
         def solve(self, problem: RepairProblem, **keys: Any) -> SolveResult:
             self.calls += 1
-            if self.calls == 3:
+            if self.calls == self.at:
                 signal.raise_signal(signal.SIGINT)
             return self.inner.solve(problem, **keys)
 
-    monkeypatch.setitem(registry._EXTRA, "ctrl-c", Interrupted)
+    registry.register("ctrl_c", Interrupted, settings=CtrlC)
+    yield
+    registry.BACKENDS.unregister("ctrl_c")
 
 
 @pytest.mark.usefixtures("interrupted")
@@ -196,7 +221,7 @@ def test_an_interrupt_loses_nothing_that_was_found(
     argv = [
         "run",
         "--backend",
-        "ctrl-c",
+        "ctrl_c",
         "--set",
         "search.rule=scan",
         "search.sides=first",
@@ -212,6 +237,19 @@ def test_an_interrupt_loses_nothing_that_was_found(
     assert content["complete"] is False
     assert content["f_ttr_s"] == 0.4
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_an_interrupt_at_the_ttr_keeps_the_ttr(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    argv = ["run", "--backend", "ctrl_c", "--set", "driver=at_ttr", "ctrl_c.at=1", "--out", str(tmp_path)]
+    assert main([*argv, "--no-figure"]) == 130
+    out, err = capsys.readouterr()
+    assert "budget_exhausted" in out
+    assert "stopped early" in out
+    assert "interrupted" in err
+    content = json.loads(text_of(tmp_path / "result.json"))
+    assert (content["complete"], content["f_ttr_s"], content["probes"]) == (False, None, [])
+    assert f"Metrics   TTR {content['metrics']['ttr']['value_s']:.2f} s" in out
 
 
 def test_an_interrupt_before_anything_was_found(
@@ -237,16 +275,23 @@ def test_a_time_limit_is_an_answer(capsys: pytest.CaptureFixture[str]) -> None:
 # -- the small verbs -------------------------------------------------------------------------------
 
 
-def test_backends_says_what_is_missing(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(
-        registry._BACKENDS, "other", ("repair.nowhere", "make", ("no_such_package",), "another one")
-    )
+def test_backends_says_what_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    needing = BackendSpec("repair.nowhere:make", None, ("no_such_package",), "another one")
+    nowhere = BackendSpec("repair.nowhere:make", None, (), "a third one")
+    try:
+        registry.register("other", needing)
+        registry.register("third", nowhere)
+        assert main(["backends"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert any(line.startswith("ego ") and "soft penalties" in line for line in lines)
+        assert any(line.startswith("other ") and "not available: no_such_package" in line for line in lines)
+        assert any(line.startswith("third ") and "not available: repair.nowhere" in line for line in lines)
+        assert "needs the package no_such_package" in refused(["run", "--backend", "other"], capsys)
+    finally:
+        for name in ("other", "third"):
+            registry.BACKENDS.unregister(name)
     assert main(["backends"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("ego ") and "soft penalties" in line for line in lines)
-    assert any(line.startswith("other ") and "not available: no_such_package" in line for line in lines)
+    assert "no_such_package" not in capsys.readouterr().out
 
 
 def test_presets_and_config(capsys: pytest.CaptureFixture[str]) -> None:
@@ -270,12 +315,23 @@ def test_presets_and_config(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_key_table_is_complete() -> None:
-    from repair.config import CHOICES, RANGES
-    from repair.report.keys import configuration_keys
+    from repair.config.schema import configuration_keys, values_of, words_of
+    from repair.report.keys import key_table
 
-    names = [key.name for key in configuration_keys()]
-    assert len(names) == len(set(names))
-    assert set(CHOICES) | set(RANGES) <= set(names)
+    keys = configuration_keys()
+    assert len(keys) == len({key.name for key in keys})
+    head, rule, *rows = key_table().splitlines()
+    assert head.count("|") == rule.count("|") == 5
+    for key, row in zip(keys, rows, strict=True):
+        name, default, possible, meaning = (x.strip() for x in row.strip("|").split(" | "))
+        assert name == f"`{key.name}`"
+        typed = load_config(overrides=[f"{key.name}={default.strip('`')}"])  # what is shown can be typed
+        assert values_of(typed)[key.name] == key.default
+        assert meaning == key.setting.says
+        for word in words_of(key) or ():
+            assert f"`{word}`" in possible
+        for bound in (key.setting.low, key.setting.high):
+            assert bound is None or f"{bound:g}" in possible
 
 
 def test_what_a_solver_calls_infeasible_and_the_checker_does_not_is_explained() -> None:
@@ -373,6 +429,17 @@ def test_a_start_that_is_not_finite(
         (["run", "--config", "nowhere.yaml"], ("nowhere.yaml", "does not exist")),
         (["run", "--reference", "nowhere.xml"], ("'nowhere.xml'", "nor a file")),
         (["run", "--reference", "recorded"], ("reference.obstacle_id",)),
+        (
+            ["run", "--set", "reference.obstacle_id=7"],
+            ("reference.obstacle_id", "no effect with reference.source=planner"),
+        ),
+        (
+            ["run", "--reference", "constant", "--set", "reference.file=a.xml"],
+            ("reference.file", "no effect with reference.source=constant"),
+        ),
+        (["run", "--set", "metrics=[ttr, tto]"], ("metrics", "'tto' is unknown", "ttb, ttk, tts, ttr")),
+        (["run", "--set", "checker.extra=[tea]"], ("checker.extra", "tea")),
+        (["run", "--set", "seed=3"], ("no configuration key 'seed'",)),
         (["run", "--set", "scene.vehicle=9"], ("vehicle type 9", "FORD_ESCORT")),
         (["run", "--set", "scene.planning_problem=12345"], ("no planning problem 12345",)),
         (["run", "one.xml", "two.xml"], ("two.xml", "--help")),
@@ -442,6 +509,11 @@ def test_public_names_are_there() -> None:
     assert "repair" in dir(repair)
     with pytest.raises(AttributeError, match="no_such_name"):
         repair.no_such_name  # noqa: B018
+
+
+def test_no_module_has_the_name_of_something_public() -> None:
+    """Importing a module puts it into the package under its name, over whatever stood there."""
+    assert not {module.name for module in pkgutil.iter_modules(repair.__path__)} & set(repair.__all__)
 
 
 def test_bad_input_in_a_process_of_its_own(tmp_path: Path) -> None:

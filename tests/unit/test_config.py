@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields, is_dataclass
+import copy
+import json
+import pickle
+from dataclasses import asdict, fields, is_dataclass, replace
 
+import numpy as np
 import pytest
 import yaml
 
-from repair.config import CHOICES, RANGES, Config, load_config, preset_names
-from repair.errors import ConfigError, RepairError
-from repair.scene import settings as module
+from repair.config import Config, load_config, preset_names
+from repair.config.load import recorded_config
+from repair.config.schema import configuration_keys, values_of, words_of
+from repair.errors import BackendError, ConfigError, RepairError
+from repair.solvers.registry import backend_names
+
+KEYS = {key.name: key for key in configuration_keys()}
+WORDS = {name: words_of(key) for name, key in KEYS.items() if words_of(key)}
+RANGES = {
+    name: (key.setting.low, key.setting.high)
+    for name, key in KEYS.items()
+    if key.setting.low is not None or key.setting.high is not None
+}
 
 
 def value_of(config, key):
     for part in key.split("."):
         config = getattr(config, part)
     return config
+
+
+def listed(value):
+    return value if isinstance(value, list) else [value]
 
 
 def test_defaults_are_the_dataclasses():
@@ -30,26 +48,48 @@ def test_two_loads_share_nothing():
     assert load_config() == Config()
 
 
-def test_every_choice_and_range_names_an_existing_key_and_holds_its_default():
-    for key, choices in CHOICES.items():
-        assert value_of(Config(), key) in choices, key
-    for key, (low, high) in RANGES.items():
-        default = value_of(Config(), key)
-        assert default is None or low <= default <= high, key
+def test_every_key_is_a_value_of_the_configuration_with_its_default_in_range():
+    assert list(values_of(Config())) == list(KEYS)
+    for name, key in KEYS.items():
+        assert value_of(Config(), name) == key.default, name
+        assert key.setting.says, f"{name} has no meaning"
+    for name, words in WORDS.items():
+        assert set(listed(KEYS[name].default)) <= set(words), name
+    for name, (low, high) in RANGES.items():
+        default = KEYS[name].default
+        assert default is None or low <= default <= high, name
+        assert KEYS[name].type.split(" or ")[0] in ("int", "float"), name
+    for key in KEYS.values():
+        needed = key.setting.only_with
+        assert needed is None or needed[0] in KEYS
 
 
-@pytest.mark.parametrize("key", sorted(CHOICES))
+def test_every_number_has_a_range():
+    """But for ids, which may be any."""
+    numbers = {name for name, key in KEYS.items() if set(key.type.split(" or ")) & {"int", "float"}}
+    ids = {"scene.vehicle", "scene.planning_problem", "reference.obstacle_id"}
+    assert numbers - set(RANGES) == ids
+    assert all(low is not None and high is not None for low, high in RANGES.values())
+
+
+@pytest.mark.parametrize("key", sorted(WORDS))
 def test_every_choice_is_accepted_and_another_word_refused(key):
-    for word in CHOICES[key]:
-        assert value_of(load_config(overrides=[f"{key}={word}"]), key) == word
-    with pytest.raises(ConfigError, match=f"'{key}'.*nonsense.*{CHOICES[key][0]}"):
-        load_config(overrides=[f"{key}=nonsense"])
+    several = isinstance(KEYS[key].default, list)
+    for word in WORDS[key]:
+        config = load_config(overrides=[f"{key}={[word] if several else word}"])
+        assert listed(value_of(config, key)) == [word]
+    with pytest.raises(ConfigError, match=f"'{key}'.*nonsense.*{WORDS[key][0]}"):
+        load_config(overrides=[f"{key}={'[nonsense]' if several else 'nonsense'}"])
+    if several:
+        assert value_of(load_config(overrides={key: list(WORDS[key])}), key) == list(WORDS[key])
+        with pytest.raises(ConfigError, match=f"'{key}'.*'nonsense' is unknown"):
+            load_config(overrides={key: [WORDS[key][0], "nonsense"]})
 
 
 @pytest.mark.parametrize("key", sorted(RANGES))
 def test_every_range_is_closed(key):
     low, high = RANGES[key]
-    kind = type(value_of(Config(), key))
+    kind = int if KEYS[key].type.startswith("int") else float
     for value in (low, high):
         shown = int(value) if kind is int else value
         assert value_of(load_config(overrides={key: shown}), key) == pytest.approx(value)
@@ -75,7 +115,52 @@ def test_null_takes_an_optional_value_away():
 
 
 def test_the_last_override_wins():
-    assert load_config(overrides=["seed=1", "seed=2"]).seed == 2
+    assert load_config(overrides=["search.delta_t=0.1", "search.delta_t=0.2"]).search.delta_t == 0.2
+
+
+@pytest.mark.parametrize("overrides", [["seed=1"], {"seed": 1}])
+def test_the_seed_that_never_did_anything_is_no_key(overrides):
+    with pytest.raises(ConfigError, match="no configuration key 'seed'"):
+        load_config(overrides=overrides)
+
+
+NUMPY = [
+    ("search.delta_t", np.float64(0.25), 0.25),
+    ("search.delta_t", np.float32(0.25), 0.25),
+    ("search.delta_t", np.int64(2), 2.0),
+    ("search.delta_t", np.array(0.25), 0.25),
+    ("search.time_limit", np.float64(1.5), 1.5),
+    ("repair.degree", np.int64(4), 4),
+    ("scene.planning_problem", np.uint16(7), 7),
+    ("scene.vehicle", np.int32(2), 2),
+    ("reference.source", np.str_("constant"), "constant"),
+    ("checker.margin", np.bool_(True), True),
+    ("repair.relax", np.array([-0.1, -0.5]), [-0.1, -0.5]),
+    ("repair.relax", [np.float64(-0.1)], [-0.1]),
+    ("repair.relax", (np.float32(-0.5),), [-0.5]),
+]
+
+
+@pytest.mark.parametrize("key, given, value", NUMPY)
+def test_numbers_of_numpy_are_numbers(key, given, value):
+    config = load_config(overrides={key: given})
+    assert value_of(config, key) == value
+    assert type(value_of(config, key)) is type(value)
+    section, _, last = key.partition(".")
+    assert load_config(overrides={section: {last: given}}) == config
+    assert load_config(**{section: {last: given}}) == config
+    assert json.loads(json.dumps(config.to_dict())) == config.to_dict()
+
+
+def test_numbers_of_numpy_are_checked_like_any_other():
+    with pytest.raises(ConfigError, match=r"'search.delta_t' is -1.0; it must lie in"):
+        load_config(overrides={"search.delta_t": np.float64(-1.0)})
+    with pytest.raises(ConfigError, match=r"'search.delta_t'.*finite"):
+        load_config(overrides={"search.delta_t": np.float64("nan")})
+    with pytest.raises(ConfigError, match=r"'repair\.degree'"):
+        load_config(overrides={"repair.degree": np.float64(3.5)})
+    with pytest.raises(ConfigError, match=r"'search\.delta_t'"):
+        load_config(overrides={"search.delta_t": np.array([0.1, 0.2])})
 
 
 @pytest.mark.parametrize(
@@ -96,7 +181,7 @@ def test_the_last_override_wins():
         ("search=3", "'search'"),
         ("search.delta_t.x=3", "search.delta_t"),
         ("backend=[1,2]", "backend"),
-        ("seed={a: 1}", "seed"),
+        ("driver={a: 1}", "driver"),
         ("limits.a_min=3", "'limits.a_min'"),
         ("search.delta_t", "key=value"),
         ("=3", "key=value"),
@@ -156,6 +241,8 @@ def test_file_lies_over_the_preset_and_under_the_overrides(tmp_path):
     [
         ("search: {detla_t: 0.2}\n", "own.yaml.*'search.detla_t'"),
         ("search: {delta_t: soon}\n", "own.yaml.*'search.delta_t'"),
+        ("search.delta_t: 0.2\n", "own.yaml.*'search.delta_t'; write each part of the name as a mapping"),
+        ("ego: {refine.fit: 0.2}\n", "own.yaml.*'ego.refine.fit'; write each part of the name as a mapping"),
         ("search: [1, 2]\n", "'search'"),
         ("search:\n", "'search' is empty"),
         ("ego: {deform: 3}\n", "'ego.deform' is 3"),
@@ -190,8 +277,44 @@ def test_round_trip_through_a_file(tmp_path):
     config = load_config(
         preset="scenario_1", backend="ego", overrides=["limits.a_min=-4.5", "search.time_limit=2"]
     )
-    path = write(tmp_path, yaml.safe_dump(asdict(config)))
+    path = write(tmp_path, yaml.safe_dump(config.to_dict()))
     assert load_config(file=path) == config
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
+def test_what_a_result_records_is_the_configuration_again(backend):
+    overrides = ["search.delta_t=0.1", "reference.source=constant", "reference.a_lat=0.9"]
+    config = load_config(preset="scenario_1", backend=backend, overrides=overrides)
+    again = recorded_config(json.loads(json.dumps(config.to_dict())))
+    assert again == config
+    assert config.given > set()
+    assert again.given == set()  # on purpose it was said then
+    assert recorded_config({**config.to_dict(), "seed": 3}) == config  # as earlier versions wrote it
+    assert recorded_config({"search": {"delta_t": 0.2}}).search.delta_t == 0.2
+
+
+@pytest.mark.parametrize(
+    "values, message",
+    [
+        ({"temper": 1}, "no configuration key 'temper'"),
+        ({"search": 3}, "'search' is 3"),
+        ({"search": {"delta_t": -1}}, r"'search\.delta_t'"),
+    ],
+)
+def test_a_record_that_is_none_is_named(values, message):
+    with pytest.raises(ConfigError, match=message):
+        recorded_config(values)
+
+
+def test_to_dict_holds_every_key_in_the_order_in_which_they_are_shown():
+    def leaves(node, prefix=""):
+        for name, value in node.items():
+            if isinstance(value, dict) and prefix + name != "for_backend":
+                yield from leaves(value, f"{prefix}{name}.")
+            else:
+                yield prefix + name
+
+    assert list(leaves(load_config().to_dict())) == list(KEYS)
 
 
 # -- presets -----------------------------------------------------------------------------------------
@@ -272,8 +395,8 @@ def test_sections_of_other_backends_are_left_alone(tmp_path, section):
     assert load_config(file=write(tmp_path, f"for_backend:\n  {section}\n")) == Config()
 
 
-def test_schema_is_documented_field_by_field_types():
-    """Every leaf is a plain value: what a YAML file and result.json can hold."""
+def test_every_leaf_is_a_plain_value():
+    """What a YAML file and result.json can hold."""
 
     def walk(node):
         for field in fields(node):
@@ -284,4 +407,102 @@ def test_schema_is_documented_field_by_field_types():
                 assert value is None or isinstance(value, bool | int | float | str | list | dict), field.name
 
     walk(Config())
-    assert module.__doc__
+
+
+# -- sections of backends ----------------------------------------------------------------------------
+
+
+def test_every_backend_has_its_section():
+    config = load_config(overrides=["casadi.rounds=3"], backend="casadi")
+    assert config.section("casadi") is config.casadi
+    assert config.section("casadi").rounds == 3
+    for name in ("ego", "casadi", "qptr"):
+        assert config.section(name) == getattr(config, name)
+        assert name in backend_names()
+    with pytest.raises(BackendError, match="'search' has no settings"):
+        config.section("search")
+
+
+def test_copies_keep_everything_and_share_nothing():
+    config = load_config(overrides=["search.delta_t=0.1", "casadi.rounds=3"])
+    for made in (copy.deepcopy(config), pickle.loads(pickle.dumps(config))):
+        assert made == config
+        assert type(made) is type(config)
+        assert made.given == config.given == {"search.delta_t", "casadi.rounds"}
+        made.search.delta_t = 0.7
+        assert config.search.delta_t == 0.1
+    assert replace(config, backend="casadi").casadi.rounds == 3
+
+
+# -- keys without effect -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "overrides, source",
+    [
+        ({"reference.obstacle_id": 7}, "planner"),
+        ({"reference.obstacle_id": 7, "reference.source": "constant"}, "constant"),
+        ({"reference.obstacle_id": 7, "reference.source": "file", "reference.file": "a.xml"}, "file"),
+        ({"reference.file": "a.xml"}, "planner"),
+        ({"reference.file": "a.xml", "reference.source": "recorded"}, "recorded"),
+    ],
+)
+def test_what_names_something_that_is_not_looked_at_is_refused(overrides, source):
+    key = "reference.obstacle_id" if "reference.obstacle_id" in overrides else "reference.file"
+    with pytest.raises(ConfigError, match=f"'{key}' has no effect with reference.source={source}"):
+        load_config(overrides=overrides)
+    with pytest.raises(ConfigError, match=f"'{key}' has no effect"):
+        load_config(overrides=[f"{name}={value}" for name, value in overrides.items()])
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["reference.source=recorded", "reference.obstacle_id=7"],
+        ["reference.source=file", "reference.file=a.xml"],
+        ["reference.obstacle_id=null", "reference.file=null"],  # names nothing
+    ],
+)
+def test_what_is_looked_at_is_accepted(overrides):
+    load_config(overrides=overrides)
+
+
+def test_what_a_file_sets_for_another_source_may_stand_there(tmp_path):
+    """One file serves several sources; only what was said on purpose is judged."""
+    path = write(tmp_path, "reference: {obstacle_id: 7, a_lat: 0.9}\n")
+    config = load_config(file=path, overrides=["reference.source=constant"])
+    assert config.reference.obstacle_id == 7
+    assert list(config.without_effect()) == []
+
+
+@pytest.mark.parametrize(
+    "overrides, expected",
+    [
+        ([], []),
+        (["search.delta_t=0.1", "ego.w_a=2"], []),
+        (["driver=at_ttr", "search.delta_t=0.1"], [("search.delta_t", "driver", "at_ttr")]),
+        (
+            ["driver=at_ttr", "search.rule=scan", "search.upper=1", "search.time_limit=1"],
+            [("search.rule", "driver", "at_ttr"), ("search.upper", "driver", "at_ttr")],
+        ),
+        (["casadi.rounds=3"], [("casadi.rounds", "backend", "ego")]),
+        (["backend=casadi", "casadi.rounds=3"], []),
+        (["backend=casadi", "ego.deform.smooth=3"], [("ego.deform.smooth", "backend", "casadi")]),
+        (["ego.precondition=false"], [("ego.precondition", "ego.solver", "newton")]),
+        (["ego.precondition=false", "ego.solver=lbfgs"], []),
+        (
+            ["reference.source=constant", "reference.a_lat=0.9"],
+            [("reference.a_lat", "reference.source", "constant")],
+        ),
+        (["reference.a_lat=0.9"], []),
+    ],
+)
+def test_other_keys_without_effect_are_told(overrides, expected):
+    assert list(load_config(overrides=overrides).without_effect()) == expected
+
+
+def test_defaults_are_never_without_effect():
+    """A preset sets what it likes: nobody said it on purpose."""
+    for name in preset_names():
+        for backend in ("ego", "casadi", "qptr"):
+            assert list(load_config(preset=name, backend=backend).without_effect()) == []

@@ -469,7 +469,7 @@ def test_literal_fit_of_the_reference_is_the_backends(degree):
 
 def test_literal_search_finds_the_same_f_ttr_in_scenario_1(scenarios):
     from repair.config import load_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
     from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.toy import constant
 
+from repair.api import find, repair, search
+from repair.baselines.evasive.at_ttr import AtTtr
 from repair.baselines.evasive.maneuvers import EvasiveManeuver, maneuvers_at
-from repair.baselines.evasive.problems import problems_at_ttr, repair_at_ttr
 from repair.baselines.evasive.settings import EvasiveConfig
 from repair.baselines.evasive.times import EvasiveStatus, evasive_ttr
 from repair.config import load_config
-from repair.curves.base import Curve
+from repair.curves.base import Curve, SplicedCurve
+from repair.metrics.base import Asked
 from repair.paper.scenario_1 import scenario_1
 from repair.paper.scenario_2 import RoadDamage, scenario_2
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import scene_from_scenario
 from repair.search.result import SearchStatus
+from repair.search.settings import SearchConfig
 from repair.solvers.registry import make_backend
 from repair.vehicle.parameters import load_vehicle
 
@@ -43,8 +49,18 @@ def damage():
     return scene_of(scenario_2(RoadDamage(damage_width=2.0, damage_offset=0.0)))
 
 
-def prepared(scene, number, *overrides):
-    return prepare(scene, load_config(preset=f"scenario_{number}", overrides=overrides))
+def prepared(scene, number, *overrides, **keys):
+    return prepare(scene, load_config(preset=f"scenario_{number}", overrides=overrides, **keys))
+
+
+def times_of(ready):
+    return evasive_ttr(ready, ready.config.evasive)
+
+
+def at_ttr(ready, **keys):
+    """The one repair at the TTR, by the drive that the configuration asks for."""
+    assert ready.config.driver == "at_ttr"
+    return search(ready, make_backend(ready.config.backend, ready.config), **keys)
 
 
 # -- manoeuvres ------------------------------------------------------------------------------------
@@ -111,7 +127,7 @@ def test_kinematic_steering_from_rest_does_not_exist():
 
 
 def test_braking_gives_the_ttr_of_scenario_1(junction):
-    result = evasive_ttr(prepared(junction, 1))
+    result = times_of(prepared(junction, 1))
     assert result.ttr == result.ttb == pytest.approx(2.6, abs=0.11)
     assert result.ttk == -np.inf
     assert result.maneuver is BRAKE
@@ -120,7 +136,7 @@ def test_braking_gives_the_ttr_of_scenario_1(junction):
 
 
 def test_steering_gives_the_ttr_of_the_road_damage(damage):
-    result = evasive_ttr(prepared(damage, 2))
+    result = times_of(prepared(damage, 2))
     assert result.maneuver is LEFT
     assert result.tts == result.tts_left == result.ttr > result.ttb
     assert result.tts_right == -np.inf
@@ -128,9 +144,7 @@ def test_steering_gives_the_ttr_of_the_road_damage(damage):
 
 def test_later_starts_fail_and_the_ttr_does_not(junction):
     ready = prepared(junction, 1)
-    result = evasive_ttr(ready)
-    from repair.curves.base import SplicedCurve
-
+    result = times_of(ready)
     for step, hits in ((0, False), (1, True)):
         t = result.ttb + step * ready.scene.dt
         (curve,) = maneuvers_at(
@@ -141,24 +155,27 @@ def test_later_starts_fail_and_the_ttr_does_not(junction):
 
 
 def test_boxes_are_never_later_than_rectangles_plus_a_step(junction):
-    boxes = evasive_ttr(prepared(junction, 1, "evasive.collision=boxes"))
-    assert boxes.ttb <= evasive_ttr(prepared(junction, 1)).ttb + 0.1 + 1e-9
+    boxes = times_of(prepared(junction, 1, "evasive.collision=boxes"))
+    assert boxes.ttb <= times_of(prepared(junction, 1)).ttb + 0.1 + 1e-9
 
 
 def test_weaker_braking_has_to_begin_earlier(junction):
-    times = [evasive_ttr(prepared(junction, 1, f"evasive.a_brake={a}")).ttb for a in (2.0, 4.0, 8.0)]
+    times = [times_of(prepared(junction, 1, f"evasive.a_brake={a}")).ttb for a in (2.0, 4.0, 8.0)]
     assert times == sorted(times)
     assert times[0] < times[-1]
 
 
 def test_without_a_conflict_everything_is_infinite():
     free = scene_of(scenario_2(RoadDamage(damage_gap=400.0)))
-    result = evasive_ttr(prepared(free, 2, "repair.horizon=3"))
+    result = times_of(prepared(free, 2, "repair.horizon=3"))
     assert result.ttb == result.ttk == result.tts == result.ttr == np.inf
     assert result.maneuver is None
     assert set(result.status.values()) == {EvasiveStatus.NO_CONFLICT}
-    answer = repair_at_ttr(prepared(free, 2), make_backend("qptr", load_config(backend="qptr")))
-    assert answer.search.status is SearchStatus.NO_CONFLICT
+    answer = at_ttr(prepared(free, 2, backend="qptr", driver="at_ttr"))
+    assert answer.status is SearchStatus.NO_CONFLICT
+    assert answer.search.probes == ()
+    assert answer.ttr == np.inf
+    assert answer.to_dict()["metrics"] == {"ttr": {"value_s": None, "status": "no_conflict"}}
 
 
 # -- one repair at TTR -----------------------------------------------------------------------------
@@ -166,9 +183,9 @@ def test_without_a_conflict_everything_is_infinite():
 
 def test_qptr_has_no_answer_at_the_ttr_of_either_scenario(junction, damage):
     for number, scene in ((1, junction), (2, damage)):
-        config = load_config(preset=f"scenario_{number}", backend="qptr", driver="at_ttr")
-        answer = repair_at_ttr(prepare(scene, config), make_backend("qptr", config))
-        assert answer.search.status is SearchStatus.NONE_FEASIBLE
+        answer = at_ttr(prepared(scene, number, backend="qptr", driver="at_ttr"))
+        assert answer.status is SearchStatus.NONE_FEASIBLE
+        assert answer.search.complete
         (probe,) = answer.search.probes
         assert probe.t_rep == pytest.approx(answer.ttr)
         assert probe.solve.curve is None
@@ -176,21 +193,175 @@ def test_qptr_has_no_answer_at_the_ttr_of_either_scenario(junction, damage):
 
 def test_problem_is_built_around_the_maneuver(junction):
     ready = prepared(junction, 1)
-    evasive = evasive_ttr(ready)
-    first = problems_at_ttr(ready, evasive)[0]
+    evasive = times_of(ready)
+    source = AtTtr(ready.source, evasive)
+    assert source.visits == (evasive.ttr,)
+    first, *others = source.at(evasive.ttr)
     assert first.t_rep == pytest.approx(evasive.ttr)
     guide = first.passing.guide
     np.testing.assert_allclose(guide.position, evasive.curve.sample(guide.t).position)
+    # The other open sides, that of the manoeuvre left out, are those of any search.
+    usual = [p.passing.maneuver for p in ready.source.at(evasive.ttr)]
+    assert [p.passing.maneuver for p in others] == [m for m in usual if m is not first.passing.maneuver]
+    margins = [problems[0].margin for problems in source.relaxed(0.4)]
+    assert margins == [problems[0].margin for problems in ready.source.relaxed(0.4)]
+
+
+def test_without_a_maneuver_nothing_is_visited(junction):
+    ready = prepared(
+        junction, 1, "evasive.a_brake=0.1", "evasive.a_steer=0.1", driver="at_ttr", backend="qptr"
+    )
+    evasive = times_of(ready)
+    assert evasive.ttr == -np.inf
+    source = AtTtr(ready.source, evasive)
+    assert (source.visits, source.at(1.0)) == ((), ())
+    answer = at_ttr(ready)
+    assert (answer.status, answer.search.probes) == (SearchStatus.NONE_FEASIBLE, ())
+    assert answer.ttr == -np.inf
+    assert answer.to_dict()["metrics"] == {"ttr": {"value_s": None, "status": "never"}}
 
 
 def test_repair_at_an_early_ttr_is_found(junction):
-    config = load_config(
-        preset="scenario_1", backend="qptr", overrides=["evasive.a_brake=1.5", "qptr.solver=daqp"]
-    )
-    answer = repair_at_ttr(prepare(junction, config), make_backend("qptr", config))
-    assert answer.search.status is SearchStatus.FOUND
-    assert answer.search.f_ttr == pytest.approx(answer.ttr)
+    overrides = ["evasive.a_brake=1.5", "qptr.solver=daqp"]
+    ready = prepared(junction, 1, *overrides, backend="qptr", driver="at_ttr")
+    answer = at_ttr(ready)
+    assert answer.status is SearchStatus.FOUND
+    assert answer.f_ttr == pytest.approx(answer.ttr)
     assert answer.search.curve is not None
+    # Whichever way it is asked for.
+    found = find(ready, make_backend("qptr", ready.config))
+    again = repair(junction, preset="scenario_1", backend="qptr", overrides=[*overrides, "driver=at_ttr"])
+    for other in (found, again.search):
+        assert (other.status, other.f_ttr) == (answer.status, answer.f_ttr)
+        times = np.linspace(answer.f_ttr, ready.t_end, 20)
+        np.testing.assert_array_equal(
+            other.curve.sample(times).position, answer.search.curve.sample(times).position
+        )
+    assert again.ttr == answer.ttr
+
+
+EARLY = ("evasive.a_brake=1.5",)
+
+
+def test_the_ttr_is_kept_and_shown(junction, capsys, tmp_path):
+    from repair.cli.command import main
+
+    answer = at_ttr(prepared(junction, 1, *EARLY, backend="qptr", driver="at_ttr"))
+    assert answer.metrics["ttr"].value == answer.ttr == times_of(answer.prepared).ttr
+    kept = answer.to_dict()["metrics"]
+    assert kept == {"ttr": {"value_s": pytest.approx(answer.ttr), "status": "found"}}
+    assert answer.outcome.metrics == {"ttr": pytest.approx(answer.ttr)}
+    argv = ["run", "scenario_1", "--backend", "qptr", "--set", "driver=at_ttr", *EARLY]
+    assert main(argv) == 0
+    assert f"Metrics   TTR {answer.ttr:.2f} s\n" in capsys.readouterr().out
+    assert main(["run", "scenario_1"]) == 0
+    assert "Metrics" not in capsys.readouterr().out
+
+
+def test_the_search_without_metrics_has_no_ttr(junction):
+    answer = repair(junction, preset="scenario_1", backend="qptr")
+    assert answer.ttr is None
+    assert answer.metrics == answer.to_dict()["metrics"] == {}
+
+
+def test_at_ttr_keeps_the_time_limit(junction):
+    answer = at_ttr(prepared(junction, 1, "search.time_limit=0", *EARLY, backend="qptr", driver="at_ttr"))
+    assert (answer.status, answer.search.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
+    assert answer.search.probes == ()
+    assert answer.f_ttr is None
+    assert answer.ttr == times_of(answer.prepared).ttr  # it is known all the same
+    content = answer.to_dict()
+    assert (content["status"], content["complete"]) == ("budget_exhausted", False)
+    assert content["metrics"]["ttr"]["value_s"] == pytest.approx(answer.ttr)
+
+
+def test_finding_the_ttr_is_part_of_the_time(junction):
+    """What the backend is told is left is less than the limit by the time of the manoeuvres."""
+    ready = prepared(junction, 1, "search.time_limit=100", *EARLY, backend="qptr", driver="at_ttr")
+    inner, limits = make_backend("qptr", ready.config), []
+
+    class Listening:
+        name, capabilities = inner.name, inner.capabilities
+
+        def solve(self, problem, *, warm_start=None, time_limit=None):
+            limits.append(time_limit)
+            return inner.solve(problem, warm_start=warm_start, time_limit=time_limit)
+
+    class Slow(Asked):
+        @property
+        def evasive(self):
+            time.sleep(0.2)
+            return times_of(ready)
+
+    find(ready, Listening(), asked=Slow(ready, ready.config.evasive))
+    assert 0.0 < limits[0] <= 99.8
+    # The manoeuvres alone may take it all; then no problem is made.
+    ready = replace(ready, config=replace(ready.config, search=SearchConfig(time_limit=0.1)))
+    found = find(ready, Listening(), asked=Slow(ready, ready.config.evasive))
+    assert (found.status, found.probes, found.complete) == (SearchStatus.BUDGET_EXHAUSTED, (), False)
+
+
+def test_an_interrupt_at_the_ttr_keeps_what_was_found(junction):
+    def pressed(*_, **__):
+        raise KeyboardInterrupt
+
+    ready = prepared(junction, 1, *EARLY, backend="qptr", driver="at_ttr")
+    answer = at_ttr(ready, on_probe=pressed)
+    assert (answer.status, answer.search.complete) == (SearchStatus.FOUND, False)
+    assert answer.f_ttr == pytest.approx(answer.ttr)
+    assert answer.to_dict()["complete"] is False
+
+    class Interrupted:
+        name, capabilities = "interrupted", make_backend("qptr", ready.config).capabilities
+        solve = pressed
+
+    answer = search(ready, Interrupted())
+    assert (answer.status, answer.search.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
+    assert (answer.f_ttr, answer.search.probes) == (None, ())
+    assert answer.ttr == times_of(ready).ttr
+
+
+def test_keys_of_the_search_become_notes_at_the_ttr(junction):
+    overrides = ["search.rule=scan", "search.upper=0.4", *EARLY]
+    answer = at_ttr(prepared(junction, 1, *overrides, backend="qptr", driver="at_ttr"))
+    assert answer.f_ttr == pytest.approx(answer.ttr)
+    assert answer.ttr > 0.4
+    notes = [note for note in answer.to_dict()["notes"] if "no effect" in note]
+    assert notes == [
+        "search.rule has no effect with driver=at_ttr", "search.upper has no effect with driver=at_ttr",
+    ]  # fmt: skip
+
+
+# -- metrics ---------------------------------------------------------------------------------------
+
+NAMES = ("ttb", "ttk", "tts", "ttr")
+
+
+@pytest.mark.parametrize("driver", ["f_ttr", "at_ttr"])
+def test_metrics_are_those_of_the_maneuvers(junction, damage, driver):
+    for number, scene in ((1, junction), (2, damage)):
+        ready = prepared(scene, number, f"metrics=[{', '.join(NAMES)}]", driver=driver)
+        expected = times_of(ready)
+        answer = search(ready, make_backend("ego", ready.config))
+        assert tuple(answer.metrics) == NAMES
+        for name in NAMES:
+            value, status = answer.metrics[name].value, answer.metrics[name].status
+            assert value == getattr(expected, name)
+            assert status == ("never" if value == -np.inf else "found")
+            kept = answer.to_dict()["metrics"][name]
+            assert kept["status"] == status
+            assert kept["value_s"] == (None if value == -np.inf else pytest.approx(value))
+        assert answer.ttr == expected.ttr == max(answer.metrics[name].value for name in NAMES[:3])
+
+
+def test_metrics_are_shown_in_their_order(junction, capsys):
+    from repair.cli.command import main
+
+    expected = times_of(prepared(junction, 1))
+    assert main(["run", "scenario_1", "--set", "metrics=[ttr, ttk, ttb]"]) == 0
+    assert f"Metrics   TTR {expected.ttr:.2f} s, TTK never, TTB {expected.ttb:.2f} s\n" in (
+        capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize("name", ["DEU_Flensburg-6_1_T-1"])
@@ -200,4 +371,4 @@ def test_official_scenario_1(scenarios, name):
     ready = prepared(load_scene(scenarios / f"{name}.xml"), 1)
     assert ready.conflict.time == pytest.approx(2.9)
     # 2.5 or 2.6 s: it hangs on centimetres, so on the speed that the reference has in the turn.
-    assert evasive_ttr(ready).ttr == pytest.approx(2.6, abs=0.11)
+    assert times_of(ready).ttr == pytest.approx(2.6, abs=0.11)

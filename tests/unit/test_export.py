@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -12,18 +13,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from repair import arrays as export
+from repair import load_result
 from repair.api import RepairResult, repair
 from repair.backend.base import SolveResult, SolveStatus
+from repair.certify.recompute import certify
 from repair.check.verdict import Conflict
 from repair.config import load_config
 from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
-from repair.errors import OutputError
+from repair.curves.codec import curve_to_dict, read_curve
+from repair.errors import OutputError, RepairError
 from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
-from repair.io.result_json import to_dict, to_json
-from repair.save import save, saved
+from repair.io.result_json import read_record, to_json
+from repair.report.birdseye import birdseye_figure
+from repair.report.profiles import profile_figure, stages_figure
+from repair.report.style import render
+from repair.save import FORMATS, Files
 from repair.scene.commonroad import load_scene, scene_from_scenario
+from repair.scene.provenance import provenance
 from repair.search.result import SearchResult, SearchStatus
 
 with warnings.catch_warnings():
@@ -76,7 +83,7 @@ def without_times(value: Any) -> Any:
 
 
 def test_json_is_strict_and_gives_the_same_object(found: RepairResult) -> None:
-    content = to_dict(found)
+    content = found.to_dict()
     assert strict(to_json(content)) == content
 
 
@@ -95,11 +102,11 @@ def test_every_figure_has_its_unit_in_the_key(found: RepairResult) -> None:
         elif isinstance(value, float):
             assert key.endswith(units) or key in plain, key
 
-    walk(to_dict(found), "")
+    walk(found.to_dict(), "")
 
 
 def test_content_of_a_repair(found: RepairResult) -> None:
-    content = to_dict(found)
+    content = found.to_dict()
     assert content["status"] == "found"
     assert content["ttc_s"] == round(found.ttc, 9)
     assert content["f_ttr_s"] == pytest.approx(found.f_ttr)
@@ -119,11 +126,15 @@ def test_content_of_a_repair(found: RepairResult) -> None:
 
 
 def test_the_curve_can_be_rebuilt(found: RepairResult) -> None:
-    content = to_dict(found)
+    content = found.to_dict()
     curve, driven = content["curve"], content["trajectory"]
     assert curve["type"] == "uniform_bspline"
     points = np.array(curve["control_points_m"])
     again = UniformBSpline(curve["t_start_s"], curve["spacing_s"], curve["degree"], points)
+    read = read_curve(curve)
+    assert isinstance(read, UniformBSpline)
+    np.testing.assert_array_equal(read.points, points)
+    assert (read.t_start, read.spacing, read.degree) == (again.t_start, again.spacing, again.degree)
     t = np.array(driven["t_s"])
     late = t >= content["f_ttr_s"] - 1e-9
     np.testing.assert_allclose(again.sample(t[late]).position[:, 0], np.array(driven["s_m"])[late], atol=1e-8)
@@ -131,27 +142,34 @@ def test_the_curve_can_be_rebuilt(found: RepairResult) -> None:
 
 def test_other_curves_are_written_too(found: RepairResult) -> None:
     pieces = np.arange(24.0).reshape(2, 6, 2)
-    written = export._curve(BernsteinCurve(1.6, 0.5, pieces))
+    written = curve_to_dict(BernsteinCurve(1.6, 0.5, pieces))
     assert written is not None
     assert written["type"] == "bernstein"
     np.testing.assert_array_equal(written["control_points_m"], pieces)
-    sampled = export._curve(found.curve, 1.0)
+    read = read_curve(written)
+    assert isinstance(read, BernsteinCurve)
+    assert (read.t_start, read.duration) == (1.6, 0.5)
+    np.testing.assert_array_equal(read.points, pieces)
+    assert curve_to_dict(None) is read_curve(None) is None
+    sampled = curve_to_dict(found.curve, 1.0)
     assert sampled is not None
+    with pytest.raises(RepairError, match=r"the curve in result\.json"):
+        read_curve(sampled)
     assert sampled["type"] == "samples"
     assert len(sampled["t_s"]) == len(sampled["s_m"]) == len(sampled["l_mps2"]) == 11
 
 
 def test_same_input_same_content_apart_from_times(scenario_file: Path, found: RepairResult) -> None:
-    again = to_dict(repair(scenario_file, CONFIG))
-    assert without_times(again) == without_times(to_dict(found))
-    assert to_json(without_times(again)) == to_json(without_times(to_dict(found)))
+    again = repair(scenario_file, CONFIG).to_dict()
+    assert without_times(again) == without_times(found.to_dict())
+    assert to_json(without_times(again)) == to_json(without_times(found.to_dict()))
 
 
 @pytest.mark.parametrize("status", [s for s in SearchStatus if s is not SearchStatus.FOUND])
 def test_without_a_repair_figures_are_null(found: RepairResult, status: SearchStatus) -> None:
     inf = float("inf")
     times = {"time": inf, "contact_time": inf, "kind": "none"} if status is SearchStatus.NO_CONFLICT else {}
-    content = strict(to_json(to_dict(ended(found, status, **times))))
+    content = strict(to_json(ended(found, status, **times).to_dict()))
     assert content["status"] == status.value
     for name in ("f_ttr_s", "peak_deceleration_mps2", "min_speed_mps", "curve", "maneuver", "solution_file"):
         assert content[name] is None
@@ -163,7 +181,7 @@ def test_infinite_and_missing_numbers_are_null(found: RepairResult) -> None:
         found.search.probes[0], solve=SolveResult(SolveStatus.INFEASIBLE, residuals={"a": float("nan")})
     )
     search = replace(found.search, probes=(probe,), conflict=Conflict(float("inf")))
-    content = strict(to_json(to_dict(replace(found, search=search))))
+    content = strict(to_json(replace(found, search=search).to_dict()))
     assert content["ttc_s"] is None
     assert content["contact_ttc_s"] is None
     assert content["probes"][0]["objective"] is None
@@ -174,23 +192,24 @@ def test_infinite_and_missing_numbers_are_null(found: RepairResult) -> None:
 def test_provenance_of_a_file_and_of_memory(found: RepairResult, tmp_path: Path) -> None:
     scene = found.prepared.scene
     memory = scene_from_scenario(scene.scenario, scene.planning_problem)
-    assert export.provenance(memory)["kind"] == "reconstruction"
+    assert provenance(memory)["kind"] == "reconstruction"
     copied = tmp_path / "other.xml"
     assert scene.path is not None
     copied.write_text(scene.path.read_text("utf-8").replace("reconstruction", "recording"), "utf-8")
     other = load_scene(copied)
-    assert export.provenance(other)["kind"] == "file"
-    assert export.provenance(other)["path"] == str(copied.resolve())
-    assert export.provenance(replace(other, path=None))["kind"] == "memory"
+    assert provenance(other)["kind"] == "file"
+    assert provenance(other)["path"] == str(copied.resolve())
+    assert provenance(replace(other, path=None))["kind"] == "memory"
     # The name alone does not make a file official.
-    assert export.provenance(replace(other, id="DEU_Flensburg-6_1_T-1"))["kind"] == "file"
+    assert provenance(replace(other, id="DEU_Flensburg-6_1_T-1"))["kind"] == "file"
 
 
 # -- CommonRoad ------------------------------------------------------------------------------------
 
 
 def test_trajectory_starts_where_the_planning_problem_does(found: RepairResult) -> None:
-    trajectory, scene = to_trajectory(found), found.prepared.scene
+    scene = found.prepared.scene
+    trajectory = to_trajectory(scene, found.states)
     first = trajectory.state_list[0]
     assert trajectory.initial_time_step == first.time_step == scene.initial_time_step
     np.testing.assert_allclose(first.position, scene.planning_problem.initial_state.position, atol=1e-3)
@@ -208,7 +227,10 @@ def test_dynamic_obstacle_fits_into_the_scenario(scenario_file: Path) -> None:
     assert ego.obstacle_shape.length == result.prepared.scene.vehicle.length
     scenario.add_objects(ego)
     assert scenario.obstacle_by_id(ego.obstacle_id) is ego
-    assert to_dynamic_obstacle(result, 4711).obstacle_id == 4711
+    assert result.to_dynamic_obstacle(4711).obstacle_id == 4711
+    direct = to_dynamic_obstacle(result.prepared.scene, result.states, 4711)
+    assert direct.obstacle_id == 4711
+    np.testing.assert_array_equal(direct.initial_state.position, ego.initial_state.position)
 
 
 def test_solution_file_passes_the_official_check(found: RepairResult, tmp_path: Path) -> None:
@@ -216,7 +238,8 @@ def test_solution_file_passes_the_official_check(found: RepairResult, tmp_path: 
     from commonroad.planning.planning_problem import PlanningProblemSet
     from commonroad_dc.feasibility.solution_checker import solution_feasible, starts_at_correct_state
 
-    content, _ = saved(found, tmp_path, figure=False)
+    outcome, _ = found.saved(tmp_path, figure=False)
+    content = outcome.record
     scene = found.prepared.scene
     problems = PlanningProblemSet([scene.planning_problem])
     solution = CommonRoadSolutionReader.open(str(tmp_path / content["solution_file"]))
@@ -224,15 +247,20 @@ def test_solution_file_passes_the_official_check(found: RepairResult, tmp_path: 
     assert answer[0]
     assert starts_at_correct_state(solution, problems)
     written = solution.planning_problem_solutions[0].trajectory.state_list
-    for ours, theirs in zip(to_trajectory(found).state_list, written, strict=True):
+    for ours, theirs in zip(found.trajectory.state_list, written, strict=True):
         np.testing.assert_array_equal(ours.position, theirs.position)
         assert (ours.velocity, ours.orientation) == (theirs.velocity, theirs.orientation)
 
 
 def test_a_colliding_trajectory_is_no_solution(no_repair: RepairResult, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="no tested time-to-repair has a feasible repair"):
-        to_solution(no_repair)
-    content, written = saved(no_repair, tmp_path, figure=False)
+    for ask in (
+        no_repair.to_solution,
+        lambda: to_solution(no_repair.prepared.scene, no_repair.states, no_repair.status),
+    ):
+        with pytest.raises(OutputError, match="no tested time-to-repair has a feasible repair"):
+            ask()
+    outcome, written = no_repair.saved(tmp_path, figure=False)
+    content = outcome.record
     assert content["solution_file"] is None
     assert not list(tmp_path.glob("solution_*"))
     assert written[0] == tmp_path / "result.json"
@@ -243,7 +271,7 @@ def test_a_colliding_trajectory_is_no_solution(no_repair: RepairResult, tmp_path
 
 def test_save_writes_all_files_and_nothing_else(found: RepairResult, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
-    written = save(found, folder)
+    written = found.save(folder)
     assert sorted(p.name for p in written) == sorted(p.name for p in folder.iterdir())
     content = strict((folder / "result.json").read_text("utf-8"))
     assert written[0].name == "result.json"
@@ -256,16 +284,16 @@ def test_save_writes_all_files_and_nothing_else(found: RepairResult, tmp_path: P
 def test_saving_again_removes_what_no_longer_holds(
     found: RepairResult, no_repair: RepairResult, tmp_path: Path
 ) -> None:
-    save(found, tmp_path, figure=True)
+    found.save(tmp_path, figure=True)
     (tmp_path / "mine.txt").write_text("kept")
-    save(no_repair, tmp_path, figure=False)
+    no_repair.save(tmp_path, figure=False)
     left = {p.name for p in tmp_path.iterdir()}
     assert not any(name.startswith("solution_") or name.endswith(".png") for name in left)
     assert {"mine.txt", "result.json"} <= left
 
 
 def test_solution_file_is_the_same_every_time(found: RepairResult, tmp_path: Path) -> None:
-    one, two = (saved(found, tmp_path / name, figure=False)[1] for name in ("one", "two"))
+    one, two = (found.saved(tmp_path / name, figure=False)[1] for name in ("one", "two"))
     assert [p.name for p in one] == [p.name for p in two]
     for a, b in zip(one[1:], two[1:], strict=True):
         assert a.read_bytes() == b.read_bytes()
@@ -276,15 +304,15 @@ def test_a_full_disk_leaves_nothing_behind(
 ) -> None:
     calls = []
 
-    def full(path: Path, content: bytes) -> None:
-        calls.append(path)
-        path.write_bytes(content[:10])
+    def full(descriptor: int) -> None:
+        calls.append(descriptor)
+        os.ftruncate(descriptor, 10)
         if len(calls) == 2:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("repair.files._write", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OutputError, match="No space left on device"):
-        save(found, tmp_path / "a" / "b", figure=False)
+        found.save(tmp_path / "a" / "b", figure=False)
     assert list(tmp_path.iterdir()) == []
     assert len(calls) == 2
 
@@ -293,14 +321,14 @@ def test_a_folder_that_cannot_be_made(found: RepairResult, tmp_path: Path) -> No
     (tmp_path / "file").write_text("in the way")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(OutputError, match="cannot be"):
-            save(found, folder, figure=False)
+            found.save(folder, figure=False)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
 def test_a_name_taken_by_a_folder(found: RepairResult, tmp_path: Path) -> None:
     (tmp_path / "result.json").mkdir()
     with pytest.raises(OutputError, match="results cannot be written"):
-        save(found, tmp_path, figure=False)
+        found.save(tmp_path, figure=False)
     assert not list(tmp_path.glob(".*"))
 
 
@@ -310,12 +338,8 @@ def test_a_name_taken_by_a_folder(found: RepairResult, tmp_path: Path) -> None:
 def test_figures_are_drawn_without_global_state(found: RepairResult) -> None:
     import sys
 
-    from repair.report.birdseye import birdseye_figure
-    from repair.report.profiles import profile_figure, stages_figure
-    from repair.report.style import render
-
     before = "matplotlib.pyplot" in sys.modules
-    figure = profile_figure(found)
+    figure = profile_figure(found.outcome)
     assert [a.get_ylabel().replace("\n", " ") for a in figure.axes] == [
         "distance driven s [m]", "speed [m/s]", "acceleration [m/s²]",
     ]  # fmt: skip
@@ -324,19 +348,235 @@ def test_figures_are_drawn_without_global_state(found: RepairResult) -> None:
     assert "reference" in labels
     assert sum(label.startswith("$t_{rep}$") for label in labels) == len(found.search.probes)
     assert sum("F-TTR" in label for label in labels) == 1
-    assert render(figure) == render(profile_figure(found))
+    assert render(figure) == render(profile_figure(found.outcome))
+    for kind in ("svg", "pdf"):
+        one, two = (render(profile_figure(found.outcome), kind) for _ in range(2))
+        assert one == two
     assert "reconstruction" in figure.axes[0].get_title()
-    for other in (birdseye_figure(found), stages_figure(found)):
+    for other in (birdseye_figure(found.outcome), stages_figure(found.outcome)):
         assert render(other).startswith(PNG)
     assert ("matplotlib.pyplot" in sys.modules) == before
 
 
 def test_figures_without_a_repair(no_repair: RepairResult) -> None:
-    from repair.report.birdseye import birdseye_figure
-    from repair.report.profiles import profile_figure, stages_figure
-    from repair.report.style import render
-
     for draw in (profile_figure, birdseye_figure):
-        assert render(draw(no_repair), "svg")
+        assert render(draw(no_repair.outcome), "svg")
     with pytest.raises(ValueError, match="no probe"):
-        stages_figure(no_repair)
+        stages_figure(no_repair.outcome)
+
+
+# -- read back -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def folder(found: RepairResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("saved")
+    found.save(made)
+    return made
+
+
+@pytest.fixture
+def copied(folder: Path, tmp_path: Path) -> Path:
+    """A folder that a test may spoil."""
+    for file in folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    return tmp_path
+
+
+def edit(file: Path, change: Any) -> None:
+    content = json.loads(file.read_text("utf-8"))
+    change(content)
+    file.write_text(json.dumps(content), "utf-8")
+
+
+def test_the_record_of_a_folder_is_its_file(found: RepairResult, folder: Path) -> None:
+    outcome = load_result(folder)
+    assert outcome.record == strict((folder / "result.json").read_text("utf-8")) == read_record(folder)
+    assert load_result(str(folder)).record == outcome.record
+    files = ("solution_file", "figure_files", "scenario_file", "drawing_file")
+    assert {**outcome.record, **dict.fromkeys(files)} == {**found.to_dict(), **dict.fromkeys(files)}
+    assert all(outcome.record[name] for name in files)
+    assert (outcome.scenario, outcome.backend, outcome.status) == (found.prepared.scene.id, "ego", "found")
+    assert outcome.ttc == pytest.approx(found.ttc)
+    assert outcome.f_ttr == pytest.approx(found.f_ttr)
+    assert [p["t_rep_s"] for p in outcome.probes] == pytest.approx([p.t_rep for p in found.search.probes])
+    assert outcome.metrics == {}
+
+
+def test_the_outcome_that_saving_gives_is_the_one_that_is_read(found: RepairResult, tmp_path: Path) -> None:
+    outcome, written = found.saved(tmp_path, figure=False)
+    assert load_result(tmp_path).record == outcome.record
+    assert {p.name for p in written} == {p.name for p in tmp_path.iterdir()}
+    assert found.to_dict()["solution_file"] is None  # what is in memory names no files
+
+
+def test_figures_from_the_folder_are_those_that_were_saved(found: RepairResult, folder: Path) -> None:
+    outcome = load_result(folder)
+    assert outcome.drawing is not None
+    for name, draw in (("profiles.png", profile_figure), ("birdseye.png", birdseye_figure)):
+        assert render(draw(outcome)) == (folder / name).read_bytes()
+    assert render(stages_figure(outcome)) == render(stages_figure(found.outcome))
+    for probe in found.search.probes:
+        one, two = (stages_figure(x, probe.t_rep) for x in (outcome, found.outcome))
+        assert render(one, "svg") == render(two, "svg")
+
+
+@pytest.mark.parametrize("status", [s for s in SearchStatus if s is not SearchStatus.FOUND])
+def test_a_result_without_a_repair_is_read_back_too(
+    found: RepairResult, status: SearchStatus, tmp_path: Path
+) -> None:
+    inf = float("inf")
+    times = {"time": inf, "contact_time": inf, "kind": "none"} if status is SearchStatus.NO_CONFLICT else {}
+    result = ended(found, status, **times)
+    result.save(tmp_path)
+    outcome = load_result(tmp_path)
+    assert outcome.record == strict((tmp_path / "result.json").read_text("utf-8"))
+    assert outcome.status == status.value
+    assert outcome.ttc == pytest.approx(result.ttc)
+    assert outcome.f_ttr == (inf if status is SearchStatus.NO_CONFLICT else None)
+    assert render(profile_figure(outcome)) == (tmp_path / "profiles.png").read_bytes()
+    assert render(birdseye_figure(outcome)) == (tmp_path / "birdseye.png").read_bytes()
+
+
+DAMAGE = [b"", b"{", b"[]", b"7", b"null", b"\xff\xfe\x00", b"[" * 100_000, b"{}"]
+
+
+@pytest.mark.parametrize("name", ["result.json", "drawing.json"])
+@pytest.mark.parametrize("content", DAMAGE, ids=lambda content: repr(content[:4]))
+def test_a_damaged_file_is_named(copied: Path, name: str, content: bytes) -> None:
+    (copied / name).write_bytes(content)
+    with pytest.raises(RepairError, match=name) as raised:
+        load_result(copied)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["result.json", "drawing.json"])
+def test_a_missing_file_is_named(copied: Path, name: str) -> None:
+    (copied / name).unlink()
+    with pytest.raises(RepairError, match=name):
+        load_result(copied)
+    (copied / name).mkdir()
+    with pytest.raises(RepairError, match=name):
+        load_result(copied)
+
+
+def test_a_missing_folder_is_named(tmp_path: Path) -> None:
+    for folder in (tmp_path / "nowhere", tmp_path):
+        with pytest.raises(RepairError, match=folder.name):
+            load_result(folder)
+
+
+@pytest.mark.parametrize("missing", ["status", "config"])
+def test_what_is_no_result_is_refused(copied: Path, missing: str) -> None:
+    edit(copied / "result.json", lambda content: content.pop(missing))
+    for ask in (load_result, certify):
+        with pytest.raises(RepairError, match=r"result\.json is not the result of a repair"):
+            ask(copied)
+    edit(copied / "result.json", lambda content: content.update(status="found", config=3))
+    for ask in (load_result, certify):
+        with pytest.raises(RepairError, match=r"result\.json is not the result of a repair"):
+            ask(copied)
+
+
+def test_a_drawing_that_lacks_something_is_damaged(folder: Path, copied: Path) -> None:
+    names = json.loads((folder / "drawing.json").read_text("utf-8"))
+    for name in names.keys() - {"schema"}:
+        (copied / "drawing.json").write_bytes((folder / "drawing.json").read_bytes())
+        edit(copied / "drawing.json", lambda content, name=name: content.pop(name))
+        with pytest.raises(RepairError, match=r"drawing\.json is damaged"):
+            load_result(copied)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c: c.update(lines=[]),
+        lambda c: c.update(lines=7),
+        lambda c: c["lines"][0].pop("x"),
+        lambda c: c["lines"][0].update(x=["wide"]),
+        lambda c: c.update(start_s_m=None),
+        lambda c: c.update(steps=[]),
+        lambda c: c.update(ego=[[1.0, 2.0]]),
+        lambda c: c["bodies"][0].update(outlines=3),
+        lambda c: c["bodies"][0].update(id="a"),
+        lambda c: c.update(boxes=[{"id": 1}]),
+        lambda c: c.update(areas=[[1.0]]),
+        lambda c: c["lines"][1]["speed"].pop(),
+        lambda c: c["lines"][1].update(
+            {key: [] for key, value in c["lines"][1].items() if isinstance(value, list)}
+        ),
+        lambda c: c["lines"][1]["t"].__setitem__(3, None),
+        lambda c: c["boxes"][0]["high"].pop(),
+        lambda c: c["bodies"][0].update(outlines={"0": []}),
+        lambda c: c["ego"][0].__setitem__(1, None),
+        lambda c: c.update(ego=[]),
+        lambda c: c["edges"][0][0].__setitem__(0, None),
+        lambda c: c["unrepaired"].pop(),
+    ],
+)
+def test_a_drawing_of_another_shape_is_damaged(copied: Path, change: Any) -> None:
+    edit(copied / "drawing.json", change)
+    with pytest.raises(RepairError, match=r"drawing\.json is damaged"):
+        load_result(copied)
+
+
+def without_what_is_new(folder: Path) -> None:
+    """What an earlier version left: no drawing, no metrics, no capabilities, a seed nobody used."""
+
+    def change(content: dict[str, Any]) -> None:
+        for name in ("metrics", "capabilities", "drawing_file"):
+            content.pop(name)
+        content["config"]["seed"] = 0
+        for section, name in (("scene", "smoothing"), ("checker", "extra")):
+            content["config"][section].pop(name)
+        content["config"].pop("metrics")
+        content["config"]["casadi"]["overhang"] = 2.25
+
+    edit(folder / "result.json", change)
+    (folder / "drawing.json").unlink()
+
+
+def test_a_result_of_an_earlier_version_is_read(found: RepairResult, copied: Path) -> None:
+    without_what_is_new(copied)
+    outcome = load_result(copied)
+    assert outcome.drawing is None
+    assert outcome.metrics == {}
+    assert outcome.f_ttr == pytest.approx(found.f_ttr)
+    assert outcome.record == strict((copied / "result.json").read_text("utf-8"))
+    for draw in (profile_figure, birdseye_figure, stages_figure):
+        with pytest.raises(RepairError, match="nothing to draw"):
+            draw(outcome)
+    from repair.report.text import summary
+
+    assert "F-TTR     1.60 s" in summary(outcome.record, None)
+
+
+def test_a_result_of_an_earlier_version_is_certified(copied: Path) -> None:
+    before = certify(copied)
+    without_what_is_new(copied)
+    after = certify(copied)
+    assert before.ok
+    assert after == before
+
+
+# -- formats ---------------------------------------------------------------------------------------
+
+
+def test_every_format_names_its_files(found: RepairResult, tmp_path: Path) -> None:
+    assert FORMATS.names() == ("solution", "figures", "scenario", "drawing")
+
+    def text(result: Any) -> Files:
+        return Files({f"{result.name}.txt": b"mine"}, {"text_file": f"{result.name}.txt"}, ("old.txt",))
+
+    (tmp_path / "old.txt").write_text("of an earlier run")
+    FORMATS.register("text", text)
+    try:
+        outcome, written = found.saved(tmp_path, figure=False)
+    finally:
+        FORMATS.unregister("text")
+    name = outcome.record["text_file"]
+    assert (tmp_path / name).read_bytes() == b"mine"
+    assert written[0].name == "result.json"
+    assert {p.name for p in written} == {p.name for p in tmp_path.iterdir()}  # old.txt is gone
+    assert load_result(tmp_path).record["text_file"] == name
+    assert "text_file" not in found.saved(tmp_path, figure=False)[0].record

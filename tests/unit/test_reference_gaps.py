@@ -12,7 +12,7 @@ from tests import roads, toy
 
 from repair.config.schema import Config
 from repair.errors import ReferenceTrajectoryError
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.reference import consistency
 from repair.scene.commonroad import load_scene
 from repair.scene.reframe import reframe

@@ -9,11 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import roads
 
+from repair import load_result
+from repair.api import repair
+from repair.config import load_config
+from repair.config.load import recorded_config
 from repair.errors import ConfigError, RepairError, ScenarioError
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene, scene_from_scenario
 from repair.scene.reading import read_file
 from repair.scene.scene import Scene
+from repair.scene.settings import LOADING, SceneConfig
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.vehicle.parameters import load_vehicle
 
@@ -376,6 +383,134 @@ def test_obstacle_with_nan_is_named() -> None:
     bad.prediction.trajectory.state_list[3].position = np.array([np.nan, 0.0])
     with pytest.raises(ScenarioError, match="obstacle 8"):
         scene(two_lanes(), state(10.0, 0.0), [bad])
+
+
+# ---------------------------------------------------------------------- settings
+
+#: What a scene may be loaded with, each another value than by default.
+OTHERS = {
+    "vehicle": 2, "planning_problem": 7, "horizon": 1.5, "after_prediction": "hold", "smoothing": 0.3,
+}  # fmt: skip
+FIXED = {"reference.source": "constant", "repair.lateral": "none"}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """A straight road with a slower car ahead, and two planning problems."""
+    path = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    problems = roads.problem(100) + roads.problem(7, roads.state(10.0, 0.0))
+    path.write_text(roads.scenario(problems=problems), encoding="utf-8")
+    return path
+
+
+def test_every_key_of_the_loading_is_tried_here() -> None:
+    assert set(OTHERS) == set(LOADING)
+
+
+@pytest.mark.parametrize("name", LOADING)
+def test_a_scene_that_was_loaded_otherwise_is_refused(name: str, file: Path) -> None:
+    other = OTHERS[name]
+    if name == "planning_problem":
+        other = 100  # 7 is the smallest: by default it is that one
+    made = load_scene(file)
+    config = load_config(overrides={f"scene.{name}": other})
+    for ask in (prepare, repair):
+        with pytest.raises(ConfigError, match=rf"scene\.{name}=.* asks for {other}; load it with the config"):
+            ask(made, config)
+    assert prepare(load_scene(file, config), config).config == config
+    loaded = load_scene(file, **{name: other})
+    usual = getattr(SceneConfig(), name)
+    with pytest.raises(ConfigError, match=rf"scene\.{name}={other}, and .* asks for {usual}"):
+        prepare(loaded, load_config(overrides={f"scene.{name}": usual}))  # the default, but on purpose
+
+
+@pytest.mark.parametrize("name", LOADING)
+def test_the_same_value_on_purpose_is_fine(name: str, file: Path) -> None:
+    made = load_scene(file, **{name: OTHERS[name]})
+    config = load_config(overrides={f"scene.{name}": OTHERS[name]})
+    assert prepare(made, config).config == config
+    usual = getattr(SceneConfig(), name)
+    assert prepare(load_scene(file), load_config(overrides={f"scene.{name}": usual})).config == load_config()
+
+
+def test_the_problem_that_is_taken_by_default_may_be_named(file: Path) -> None:
+    config = load_config(overrides=["scene.planning_problem=7"])
+    prepared = prepare(load_scene(file), config)
+    assert prepared.scene.planning_problem_id == 7
+    with pytest.raises(ConfigError, match="asks for 100"):
+        prepare(load_scene(file), load_config(overrides=["scene.planning_problem=100"]))
+
+
+def test_a_value_from_a_file_of_settings_is_asked_for_too(file: Path, tmp_path: Path) -> None:
+    settings = tmp_path / "settings.yaml"
+    settings.write_text("scene: {horizon: 1.5}\n", encoding="utf-8")
+    config = load_config(file=settings)
+    with pytest.raises(ConfigError, match=r"scene\.horizon=None, and .* asks for 1\.5"):
+        prepare(load_scene(file), config)
+    assert prepare(load_scene(file, config), config).scene.horizon == pytest.approx(1.5)
+
+
+def test_a_default_configuration_takes_what_the_scene_has(file: Path, tmp_path: Path) -> None:
+    keys = {**OTHERS, "planning_problem": 100}
+    made = load_scene(file, **keys)
+    assert {name: getattr(made.settings, name) for name in LOADING} == keys
+    config = load_config(overrides={**FIXED, "scene.s_offset": 3.0})
+    result = repair(made, config)
+    taken = result.prepared.config
+    assert {name: getattr(taken.scene, name) for name in LOADING} == keys
+    assert taken.scene.s_offset == 3.0
+    assert taken.given == config.given
+    assert config.scene.vehicle == 1  # the one that was handed in is left alone
+    recorded = result.to_dict()["config"]["scene"]
+    assert recorded == {**keys, "s_offset": 3.0, "l_offset": None}
+    result.save(tmp_path / "out", figure=False)
+    assert load_result(tmp_path / "out").record["config"]["scene"] == recorded
+    # What is recorded makes the same result of the file again.
+    again = repair(file, recorded_config(result.to_dict()["config"]))
+    assert again.f_ttr == result.f_ttr
+    assert again.prepared.scene.settings == taken.scene
+
+
+def test_offsets_are_no_matter_of_the_loading(file: Path) -> None:
+    made = load_scene(file, load_config(overrides=["scene.s_offset=1.0"]))
+    wide = prepare(made, load_config(overrides={**FIXED, "scene.s_offset": 6.0}))
+    assert wide.config.scene.s_offset == 6.0
+    assert wide.conflict.time < prepare(made, load_config(overrides=FIXED)).conflict.time
+
+
+def test_a_scene_from_memory_has_its_settings_too() -> None:
+    task = problem(state(10.0, 0.0))
+    world = scenario_of(two_lanes(), [driving(7, 40.0, 0.0, 2.0)])
+    made = scene_from_scenario(world, task, SceneConfig(horizon=1.0), vehicle=3)
+    assert (made.settings.horizon, made.settings.vehicle, made.n_steps) == (1.0, 3, 10)
+    assert made.vehicle is made.model.parameters
+    assert made.vehicle.type_id == 3
+    assert prepare(made, load_config()).config.scene.vehicle == 3
+    with pytest.raises(ConfigError, match=r"scene\.vehicle=3, and .* asks for 2"):
+        prepare(made, load_config(overrides=["scene.vehicle=2"]))
+
+
+def test_single_keys_lie_over_the_configuration(file: Path) -> None:
+    config = load_config(overrides=["scene.horizon=1.0", "scene.vehicle=2"])
+    for given in (config, config.scene):
+        made = load_scene(file, given, horizon=2.0)
+        assert (made.settings.horizon, made.settings.vehicle) == (2.0, 2)
+        assert made.horizon == pytest.approx(2.0)
+    assert config.scene.horizon == 1.0
+    with pytest.raises(ConfigError, match="not with dict"):
+        load_scene(file, {"horizon": 1.0})
+
+
+def test_smoothing_moves_the_path(file: Path) -> None:
+    """A kink of the centre line is taken along as far as the key allows."""
+    x = np.arange(0.0, 121.0, 5.0)
+    zigzag = lanelet(1, np.stack([x, 0.2 * (np.arange(len(x)) % 2)], axis=1))
+    fine, coarse = (scene([zigzag], state(10.0, 0.1), smoothing=smoothing) for smoothing in (0.01, 0.15))
+    bend = [np.abs(made.frame.curvature(np.linspace(60.0, 90.0, 200))).max() for made in (fine, coarse)]
+    assert bend[1] < 0.5 * bend[0]
+    for smoothing in (0.0, -1.0, float("nan")):
+        with pytest.raises(ConfigError, match="smoothing"):
+            load_scene(file, smoothing=smoothing)
 
 
 # ---------------------------------------------------------------------- files

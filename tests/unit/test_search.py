@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from tests import toy
 
-from repair.backend.base import SolveResult, SolveStatus
+from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
-from repair.config import Config
+from repair.config import Config, load_config
+from repair.errors import BackendError
 from repair.problem.problem import Maneuver, Passing
 from repair.search.result import SearchStatus
 from repair.search.rules import probe_order
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
 from repair.solvers import registry
+from repair.solvers.registry import BACKENDS
 
 
 @dataclass
@@ -35,6 +37,9 @@ class FakeSource:
             for m in self.maneuvers
         )
 
+    def relaxed(self, t_rep):
+        return ()
+
     def passing(self, maneuver, t_rep):
         if maneuver is None:
             return None
@@ -50,6 +55,7 @@ class FakeBackend:
     costs: dict[Maneuver, float] = field(default_factory=dict)
     status: SolveStatus = SolveStatus.SOLVED
     on_solve: object = None
+    capabilities: Capabilities = field(default_factory=Capabilities)
     limits: list[float | None] = field(default_factory=list)
     warm: list[object] = field(default_factory=list)
 
@@ -451,8 +457,7 @@ def test_margins_that_there_was_no_time_for_are_no_verdict():
         def relaxed(self, t_rep):
             yield self.at(t_rep)
 
-    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
-    backend.relaxes = True
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0), capabilities=Capabilities(relaxes=True))
     keys = {"source": Relaxing(), "backend": backend, "clock": clock, "rule": "bisect"}
     result = search(until(-1.0), time_limit=0.5, **keys)
     assert (result.status, result.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
@@ -533,38 +538,208 @@ def test_a_stop_iteration_inside_a_backend_does_not_end_the_search_as_complete()
         search(until(9.0), backend=FakeBackend(on_solve=on_solve))
 
 
-def test_the_last_feasible_curve_is_offered_as_a_warm_start():
-    backend = FakeBackend()
+def test_the_last_feasible_curve_is_offered_as_a_warm_start_where_it_is_of_use():
+    backend = FakeBackend(capabilities=Capabilities(uses_warm_start=True))
     result = search(until(0.8), 1.6, backend=backend, delta_t=0.4, rule="bisect")
     assert backend.warm[0] is None
     assert backend.warm[1] is result.probes[0].solve.curve
     assert backend.warm[2] is result.probes[1].solve.curve
+    backend = FakeBackend()
+    search(until(0.8), 1.6, backend=backend, delta_t=0.4, rule="bisect")
+    assert backend.warm == [None] * 3
+
+
+# -- what a backend is able to do ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("relaxes", [False, True])
+def test_smaller_margins_are_asked_for_where_the_backend_keeps_its_own(relaxes):
+    margins = (0.05, 0.0)
+
+    class Relaxing(FakeSource):
+        def relaxed(self, t_rep):
+            for margin in margins:
+                yield tuple(replace(problem, margin=margin) for problem in self.at(t_rep))
+
+    checker = FakeChecker(lambda problem: problem.margin < 0.01)
+    backend = FakeBackend(capabilities=Capabilities(relaxes=relaxes))
+    result = search(checker, source=Relaxing(), backend=backend, upper=0.0)
+    (probe,) = result.probes
+    if relaxes:
+        assert (result.status, probe.margin) == (SearchStatus.FOUND, 0.0)
+        assert probe.tried == (
+            "yield: collision", "yield: collision (margin 0.05 m)", "yield: feasible (margin 0 m)",
+        )  # fmt: skip
+    else:
+        assert (result.status, probe.tried) == (SearchStatus.NONE_FEASIBLE, ("yield: collision",))
+        assert len(backend.limits) == 1
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_the_curve_that_comes_closest_may_pass_the_checks(strict):
+    class Near(FakeBackend):
+        def solve(self, problem, *, warm_start=None, time_limit=None):
+            closest = Closest(toy.constant(10.0), 0.3)
+            return SolveResult(SolveStatus.INFEASIBLE, detail="0.30 m are missing", closest=closest)
+
+    class Strict(FakeSource):
+        def at(self, t_rep):
+            return tuple(replace(problem, strict=strict) for problem in super().at(t_rep))
+
+    result = search(until(9.0), source=Strict(), backend=Near(), upper=0.0)
+    (probe,) = result.probes
+    assert probe.solve.status is SolveStatus.INFEASIBLE  # that word stays the backend's
+    assert probe.feasible != strict
+    if not strict:
+        assert probe.margin == pytest.approx(toy.problem(()).margin - 0.3)
+        assert "passes every check" in probe.solve.detail
+
+
+# -- given visits --------------------------------------------------------------------------------------
+
+
+def given(checker, visits, **keys):
+    """The search over times-to-repair that are given, as the paper's baseline does with one."""
+    conflict = keys.pop("conflict", Conflict(2.9, "margin", 7, 2.95))
+    source, backend = keys.pop("source", None) or FakeSource(), keys.pop("backend", None) or FakeBackend()
+    hooks = {name: keys.pop(name) for name in ("on_probe", "clock") if name in keys}
+    return search_f_ttr(source, conflict, backend, checker, SearchConfig(**keys), visits=visits, **hooks)
+
+
+@pytest.mark.parametrize("rule", ["guided", "bisect", "scan", "as_printed"])
+@pytest.mark.parametrize("visits", [(), (2.6,), (0.7, 0.3, 2.0), [1.3]])
+def test_given_times_are_visited_whatever_comes_out(rule, visits):
+    for latest in (-1.0, 0.5, 9.0):
+        source = FakeSource()
+        result = given(until(latest), visits, source=source, rule=rule, upper=0.1)
+        assert visited(result) == list(visits) == source.asked
+        assert result.complete
+        feasible = [t for t in visits if t <= latest]
+        assert result.f_ttr == max(feasible, default=None)
+        assert (result.status is SearchStatus.FOUND) == bool(feasible)
+
+
+def test_no_conflict_leaves_given_times_alone():
+    source = FakeSource()
+    result = given(until(9.0), (1.0,), source=source, conflict=Conflict(float("inf")))
+    assert (result.status, source.asked) == (SearchStatus.NO_CONFLICT, [])
+
+
+def test_given_times_keep_the_time_limit():
+    source = FakeSource()
+    result = given(until(9.0), (1.0,), source=source, clock=BentClock(), time_limit=0.0)
+    assert (result.status, result.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
+    assert source.asked == []
+    backend = FakeBackend()
+    given(until(9.0), (1.0,), backend=backend, clock=BentClock(), time_limit=3.0)
+    assert backend.limits == [3.0]
+
+
+def test_an_interrupt_at_given_times_keeps_what_was_found():
+    def pressed(*_):
+        raise KeyboardInterrupt
+
+    result = given(until(9.0), (1.0,), on_probe=pressed)
+    assert (result.status, result.f_ttr, result.complete) == (SearchStatus.FOUND, 1.0, False)
+    result = given(until(9.0), (1.0,), backend=FakeBackend(on_solve=pressed))
+    assert (result.status, result.probes, result.complete) == (SearchStatus.BUDGET_EXHAUSTED, (), False)
 
 
 # -- a backend of one's own --------------------------------------------------------------------------
 
 
-def test_a_new_backend_needs_one_registration(monkeypatch):
-    monkeypatch.setattr(registry, "_EXTRA", {})
-    registry.register("toy", lambda config: FakeBackend(name="toy"))
+@pytest.fixture
+def registered():
+    """Registers backends, and takes them back."""
+    names = []
+
+    def register(name, factory, **keys):
+        registry.register(name, factory, **keys)
+        names.append(name)
+
+    yield register
+    for name in names:
+        BACKENDS.unregister(name)
+
+
+def test_a_new_backend_needs_one_registration(registered):
+    registered("toy", lambda config: FakeBackend(name="toy"))
     assert "toy" in registry.backend_names()
     assert registry.available()["toy"] is None
     backend = registry.make_backend("toy", Config(backend="toy"))
     result = search(until(1.2), 2.9, backend=backend, delta_t=0.4)
     assert result.f_ttr == pytest.approx(1.2)
+    BACKENDS.unregister("toy")
+    assert "toy" not in registry.backend_names()
+    with pytest.raises(BackendError, match="'toy' is unknown"):
+        registry.make_backend("toy", Config(backend="toy"))
 
 
-def test_a_new_backend_runs_through_the_whole_house(monkeypatch, scenarios):
+def test_a_name_is_registered_once(registered):
+    registered("toy", lambda config: FakeBackend(name="first"))
+    for name in ("toy", "ego"):
+        with pytest.raises(BackendError, match=f"there is a backend '{name}' already"):
+            registry.register(name, lambda config: FakeBackend(name="second"))
+    assert registry.make_backend("toy", Config()).name == "first"
+    assert registry.make_backend("ego", Config()).name == "ego"
+    BACKENDS.unregister("ego")  # was not registered, and stays
+    assert "ego" in registry.backend_names()
+
+
+@pytest.mark.parametrize("name", ["ctrl-c", "two words", "", None])
+def test_a_name_is_an_identifier(name):
+    """It is the name of a section of the configuration."""
+    with pytest.raises(BackendError, match="identifier"):
+        registry.register(name, lambda config: FakeBackend())
+
+
+class Mute:
+    name = "mute"
+    capabilities = Capabilities()
+
+
+class Undeclared:
+    name = "undeclared"
+    relaxes = True  # what an earlier version looked at
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        return SolveResult(SolveStatus.INFEASIBLE)
+
+
+class Declared(Undeclared):
+    capabilities = {"relaxes": True}  # noqa: RUF012
+
+
+@pytest.mark.parametrize(
+    "made, words",
+    [
+        (None, "gave NoneType"),
+        (Mute(), "gave Mute"),
+        (Undeclared(), "declares no capabilities"),
+        (Declared(), "declares no capabilities"),
+    ],
+)
+def test_what_is_no_backend_is_refused_before_anything_is_loaded(registered, tmp_path, made, words):
     from repair.api import repair
-    from repair.config import load_config
+
+    registered("toy", lambda config: made)
+    config = load_config(backend="toy")
+    with pytest.raises(BackendError, match=f"'toy'.*{words}"):
+        registry.make_backend("toy", config)
+    with pytest.raises(BackendError, match=f"'toy'.*{words}"):
+        repair(tmp_path / "nowhere.xml", config)
+
+
+def test_a_new_backend_runs_through_the_whole_house(registered, scenarios):
+    from repair.api import repair
 
     path = scenarios / "DEU_Flensburg-6_1_T-1.xml"
     if not path.exists():
         pytest.skip(f"{path.name} is not in COMMONROAD_SCENARIOS")
-    monkeypatch.setattr(registry, "_EXTRA", {})
 
     class FullBrake:
         name = "brake"
+        capabilities = Capabilities()
 
         def solve(self, problem, *, warm_start=None, time_limit=None):
             from repair.reference.profile import SpeedProfile
@@ -573,7 +748,7 @@ def test_a_new_backend_runs_through_the_whole_house(monkeypatch, scenarios):
             profile = SpeedProfile.from_accelerations(s, v, [v / 2.8], [-2.8])
             return SolveResult(SolveStatus.SOLVED, curve=Shifted(profile, problem.t_rep), objective=0.0)
 
-    registry.register("brake", lambda config: FullBrake())
+    registered("brake", lambda config: FullBrake())
     result = repair(path, load_config(preset="scenario_1", backend="brake"))
     assert result.status is SearchStatus.FOUND
     assert 1.6 <= result.f_ttr <= 2.6
@@ -591,14 +766,10 @@ class Shifted:
         return self.t_start + 20.0
 
     def sample(self, t):
-        from dataclasses import replace
-
         times = np.atleast_1d(np.asarray(t, dtype=float))
         return replace(self.profile.sample(times - self.t_start), t=times)
 
 
 def test_unknown_backends_are_named():
-    from repair.errors import BackendError
-
     with pytest.raises(BackendError, match=r"'egoo'.*ego, casadi, qptr"):
         registry.make_backend("egoo", Config())

@@ -32,9 +32,15 @@ def first():
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_every_variation_is_a_valid_one_that_differs_from_the_preset(number):
-    preset = load_config(preset=f"scenario_{number}", backend="ego", overrides=["search.upper=null"])
+    def configured(overrides):
+        return load_config(preset=f"scenario_{number}", backend="ego", overrides=overrides)
+
+    preset = configured({"search.upper": None})
     for variation in VARIATIONS[number]:
-        made = report._config(number, "ego", variation, ())
+        made = configured({"search.upper": None, **variation.overrides})
+        typed = [f"{key}={str(value).lower()}" for key, value in variation.overrides.items()]
+        assert made == configured(["search.upper=null", *typed]), variation
+        assert list(made.without_effect()) == [], variation
         assert (made != preset) == bool(variation.overrides), variation
         assert (RoadDamage(**variation.damage) != RoadDamage()) == bool(variation.damage), variation
         assert number == 2 or not variation.damage

@@ -279,7 +279,7 @@ def situations():
     """The bundled scenario for each backend."""
     from repair.config import load_config
     from repair.paper.bundled import paper_scenario
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
     from repair.solvers.registry import make_backend
 
@@ -317,7 +317,7 @@ def test_a_search_ends_in_time(name, limit, situations):
 def test_the_ttr_is_part_of_the_search(situations):
     from repair.api import find
     from repair.config import load_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.search.settings import SearchConfig
 
     prepared, backend = situations["ego"]

@@ -13,7 +13,7 @@ from tests import roads
 
 from repair.config.schema import Config
 from repair.errors import ScenarioError
-from repair.prepare import prepare
+from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.scene.traffic.obstacles import obstacles_of
 from repair.scene.traffic.shapes import enclosing, outlines, place, polygons_of

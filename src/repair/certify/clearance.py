@@ -16,7 +16,7 @@ from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
     from repair.curves.bernstein import BernsteinCurve
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
 
 __all__ = ["allowed_depth", "clearance_rows"]
 

@@ -13,7 +13,7 @@ from repair.certify.motion import Motion
 from repair.certify.traffic import Traffic
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
 
 __all__ = ["ContactTime", "contact_rows", "contact_time_row", "road_rows", "traffic_words"]
 

@@ -41,7 +41,7 @@ from repair.io.result_json import read_record
 from repair.timegrid import steps_until
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
 
 __all__ = ["certify"]
 
@@ -136,7 +136,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
 def _prepare(folder: Path, content: Mapping[str, Any]) -> tuple[Path, Prepared]:
     """The scenario of the result, loaded and laid out again; and its file."""
     from repair.config.load import recorded_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.scene.commonroad import load_scene
 
     origin = content.get("provenance") or {}

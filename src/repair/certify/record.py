@@ -12,7 +12,7 @@ from repair.curves.base import Curve, SplicedCurve
 from repair.errors import RepairError
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
     from repair.search.result import SearchResult
 
 __all__ = ["Again", "differences", "record_rows", "searched_again"]

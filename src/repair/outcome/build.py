@@ -10,7 +10,7 @@ from repair.metrics.base import MetricValue
 from repair.outcome.data import Outcome
 from repair.outcome.draw import drawing_of
 from repair.outcome.record import record_of
-from repair.prepare import Prepared
+from repair.preparation import Prepared
 from repair.search.result import SearchResult
 from repair.vehicle.states import DrivenStates
 

@@ -7,7 +7,7 @@ import numpy as np
 from repair.arrays import Array, frozen
 from repair.curves.base import Curve, SplicedCurve
 from repair.outcome.data import Body, Box, Drawing, Line
-from repair.prepare import Prepared
+from repair.preparation import Prepared
 from repair.scene.traffic.obstacle import Obstacle
 from repair.search.result import SearchResult, SearchStatus
 from repair.timegrid import INSTANT

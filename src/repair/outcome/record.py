@@ -17,7 +17,7 @@ from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
-from repair.prepare import Prepared
+from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
 from repair.search.result import Probe, SearchResult

@@ -12,7 +12,7 @@ from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
     from repair.check.verdict import Conflict
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
     from repair.search.result import SearchResult
 
 __all__ = ["checked_until", "checks_off", "margin_only", "one_point", "status_sentence"]

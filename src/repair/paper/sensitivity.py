@@ -15,7 +15,7 @@ from repair.report.tables import Section, Table, against, decimal
 
 if TYPE_CHECKING:
     from repair.config import Config
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
     from repair.scene.scene import Scene
 
 __all__ = ["VARIATIONS", "Variation", "sensitivity"]
@@ -187,7 +187,7 @@ def _row(
 ) -> dict[str, Any]:
     """One variation as plain values."""
     from repair.baselines.evasive.times import evasive_ttr
-    from repair.prepare import prepare
+    from repair.preparation import prepare
 
     row: dict[str, Any] = {
         "factor": variation.factor, "value": variation.value, "preset": _preset_value(number, variation),

@@ -16,7 +16,7 @@ from repair.search.result import Probe, SearchResult
 
 if TYPE_CHECKING:
     from repair.config import Config
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
     from repair.scene.scene import Scene
 
 __all__ = ["METHODS", "PEAK_NAMES", "Method", "peak_of", "status_of", "table1"]
@@ -146,7 +146,7 @@ def _run(config: Config, scene: Scene) -> tuple[Prepared, SearchResult, float | 
     """Prepare and run one method; (F-)TTR as the driver has it."""
     from repair.api import find
     from repair.metrics.base import Asked
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.solvers.registry import make_backend
 
     backend = make_backend(config.backend, config)

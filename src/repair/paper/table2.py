@@ -18,7 +18,7 @@ from repair.report.tables import DASH, Section, Table, against
 from repair.search.result import SearchResult
 
 if TYPE_CHECKING:
-    from repair.prepare import Prepared
+    from repair.preparation import Prepared
     from repair.scene.scene import Scene
 
 __all__ = ["literal_transcription", "machine", "table2"]
@@ -185,7 +185,7 @@ def _timed(
     """Time ``runs`` searches of one backend."""
     from repair.api import find
     from repair.config import load_config
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.solvers.registry import make_backend
 
     config = load_config(preset=f"scenario_{number}", overrides=[f"backend={name}", *overrides])

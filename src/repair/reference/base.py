@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from repair.errors import ConfigError, in_words
+
 if TYPE_CHECKING:
     from repair.arrays import Array
     from repair.curves.base import Curve

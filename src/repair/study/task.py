@@ -45,7 +45,7 @@ def _row(
 ) -> dict[str, Any]:
     from repair.api import search
     from repair.baselines.evasive.times import evasive_ttr
-    from repair.prepare import prepare
+    from repair.preparation import prepare
     from repair.search.result import SearchStatus
     from repair.solvers.registry import make_backend
 
