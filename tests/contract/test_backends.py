@@ -153,6 +153,9 @@ class _Source:
     def relaxed(self, t_rep):
         return ()
 
+    def widened(self, t_rep):
+        return ()
+
 
 class _Checker:
     def check(self, problem, curve):

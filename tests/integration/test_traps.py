@@ -469,7 +469,7 @@ def test_solution_files(found: RepairResult, tmp_path: Path) -> None:
         "bomb.xml": (bomb, "DOCTYPE"),
         "nothing.xml": ("", "is empty"),
         "far.xml": (re.sub(r"<x>[\d.]+</x>", "<x>5000</x>", good), "4980 m from the ego"),
-        "nan.xml": (holes, "no state at the planning problem"),
+        "nan.xml": (holes, "at time step 0 position is not finite"),
     }  # fmt: skip
     for name, (text, sentence) in bad.items():
         path = tmp_path / name

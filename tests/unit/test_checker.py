@@ -10,7 +10,7 @@ from tests import roads
 
 from repair.arrays import frozen
 from repair.check.checker import Checker
-from repair.check.limits import exceeded_by_peaks
+from repair.check.limits import curve_excess, plane_excess
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
@@ -50,15 +50,24 @@ def judged_in_full(checker, problem, curve):
     states = checker.drive(spliced, problem.t_end)
     late = slice(first, None)
     words = []
-    late_from = int((times < problem.t_rep - 1e-9).sum())
-    if exceeded_by_peaks(checker.path(spliced, problem.t_end), late_from, checker.limits):
+    scene, after = checker.scene, curve.sample(times[times >= problem.t_rep - 1e-9])
+    broken = curve_excess(curve, problem.t_rep, problem.t_end, checker.limits, 0.0)
+    if broken or plane_excess(curve, after, scene.frame, checker.limits, scene.vehicle, 0.0):
         words.append("limits")
     steps = times[:: checker.config.substeps]
     if first_entry(problem.occupancy, curve.sample(steps[steps >= problem.t_rep - 1e-9])) is not None:
         words.append("margin")
     poses = states.x[late], states.y[late], states.orientation[late]
-    if checker.world.contact(*poses, first) is not None:
+    here, turn = poses[0] + 1j * poses[1], poses[2]
+    since = len(times) - len(after) - first
+    contact = checker.world.contact_along(here, turn, first, all_pairs=True)
+    near = checker.world.contact_along(
+        here, turn, first, margin=checker.config.clearance, since=since, all_pairs=True
+    )
+    if contact is not None and (near is None or contact.time <= near.time):
         words.append("collision")
+    elif near is not None:
+        words.append("margin")
     if not checker.road.inside(checker.road.outline(*poses)).all():
         words.append("off_road")
     return tuple(words)

@@ -37,6 +37,9 @@ class FakeSource:
             for m in self.maneuvers
         )
 
+    def widened(self, t_rep):
+        return ()
+
     def relaxed(self, t_rep):
         return ()
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from repair.check.checker import Checker
-from repair.check.verdict import Conflict, Verdict
+from repair.check.verdict import Conflict, Reason, Verdict
 from repair.curves.base import Curve
 from repair.timegrid import on_grid, steps_until
+from repair.world.advance import FINEST
 from repair.world.boxes import Occupancy
 from repair.world.occupancy import first_entry
 
@@ -24,7 +25,7 @@ def detect_conflict(
     Conflict
         The first violation, at the scenario's step at or before it; with the time of contact of the true
         shapes beside it. With ``checker.conflict: boxes`` an inflated box that is entered at a step counts
-        as well (the paper's TTC).
+        as well, and contact at the step after it (the paper's TTC).
     Verdict
         The checker's whole verdict on the reference.
     """
@@ -32,7 +33,8 @@ def detect_conflict(
     verdict = checker.check_reference(reference, t_end)
     contact = checker.contact(reference, t_end)
     candidates: list[tuple[float, int, str, int | None, str]] = []
-    if checker.config.conflict == "boxes":
+    boxes = checker.config.conflict == "boxes"
+    if boxes:
         steps = min(steps_until(t_end, dt), checker.scene.n_steps)
         sampled = reference.sample(np.arange(steps + 1) * dt)
         entry = first_entry(occupancy, sampled)
@@ -40,7 +42,9 @@ def detect_conflict(
             who = int(occupancy.ids[entry[1]])
             candidates.append((float(sampled.t[entry[0]]), 0, "margin", who, ""))
     for violation in verdict.violations:
-        at = on_grid(violation.time, dt)
+        at = on_grid(violation.time + FINEST, dt)  # a time of contact is early by no more than that
+        if boxes and violation.reason is Reason.COLLISION and at < violation.time:
+            at += dt  # the paper looks at steps
         candidates.append((at, 1, violation.reason.value, violation.obstacle_id, violation.detail))
     if not candidates:
         return Conflict(float("inf")), verdict

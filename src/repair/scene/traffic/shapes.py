@@ -139,6 +139,9 @@ def outlines(shape: Any, position: Array, heading: float) -> list[Array]:
 def place(shape: Any, position: Array, heading: float, speed: float) -> Placed:
     """A body shape at an exact pose.
 
+    A part whose centre is not the body's position is there twice: turned about its own centre, as
+    commonroad-io has it, and turned with the body, as it is meant. To keep clear of both is right either way.
+
     Parameters
     ----------
     shape : commonroad.geometry.shape.Shape
@@ -150,6 +153,13 @@ def place(shape: Any, position: Array, heading: float, speed: float) -> Placed:
     parts = _parts(shape)
     state = (float(position[0]), float(position[1]), heading, speed)
     part = parts[0]
+    if off_centre(shape):
+        c, s = np.cos(heading), np.sin(heading)
+        rigid = [p @ np.array([[c, s], [-s, c]]) + position for p in outlines(shape, np.zeros(2), 0.0)]
+        return union(
+            Placed(None, None, tuple(outlines(shape, position, heading)), state),
+            Placed(None, None, tuple(rigid), state),
+        )
     if len(parts) == 1 and (hasattr(part, "radius") or hasattr(part, "length")):
         center = _center_of(part) + position
         if hasattr(part, "radius"):
