@@ -20,7 +20,7 @@ from benchmarks.measure import Report, Row, Spread, Times, row, together
 CHECKS = {
     "path in the plane": "repair.check.checker:Checker._spliced",
     "driven states": "repair.vehicle.model:KinematicSingleTrack.angles",
-    "limits": "repair.check.checker:exceeded",
+    "limits": "repair.check.checker:plane_excess",
     "margin check": "repair.check.checker:Checker._margin",
     "collision check": "repair.world.collision:CollisionWorld.contact_along",
     "road check": "repair.check.checker:Checker._off_road",

@@ -69,11 +69,13 @@ def _outline(shape):
 
 
 def _placed(shape, x: float, y: float, psi: float):
-    """A shape at a pose as commonroad-io places it: each part of it turned about its own centre."""
+    """A shape at a pose: its parts turned about their own centres (commonroad-io), and as a whole."""
     if hasattr(shape, "shapes"):
         return shapely.union_all([_placed(part, x, y, psi) for part in shape.shapes])
-    turned = affinity.rotate(_outline(shape), psi, tuple(shape.center), use_radians=True)
-    return affinity.translate(turned, x, y)
+    outline, centre = _outline(shape), tuple(float(c) for c in shape.center)
+    about = [centre] if np.hypot(*centre) < 1e-9 else [centre, (0.0, 0.0)]
+    turned = [affinity.rotate(outline, psi, point, use_radians=True) for point in about]
+    return affinity.translate(shapely.union_all(turned), x, y)
 
 
 def _moving(states, shape, first: int, dt: float, t: np.ndarray):
@@ -154,3 +156,53 @@ def judged(result, file) -> float:
     states = result.trajectory.state_list
     ego = ego_of(states, scenario.dt, parameters_vehicle1.parameters_vehicle1())
     return contact_time(ego, scenario, first, (len(states) - 1) * scenario.dt)
+
+
+def main() -> int:
+    """``python -m tests.judge --crossings N``, or ``--folder DIR``: contacts, and how many were judged."""
+    import argparse
+    import tempfile
+    from collections import Counter
+    from pathlib import Path
+
+    from tests.crossings import crossing
+
+    import repair
+
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--crossings", type=int, default=0)
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--reference", nargs="+", default=["constant", "planner"])
+    options = parser.parse_args()
+    backends, count = ("ego", "casadi", "qptr"), Counter()
+
+    def judge(file: Path, backend: str, reference: str, words: str) -> None:
+        try:
+            result = repair.repair(file, backend=backend, overrides=[f"reference.source={reference}"])
+        except repair.RepairError as error:
+            print(f"refused  {words}: {error}")
+            count["refused"] += 1
+            return
+        count[result.status.value] += 1
+        if result.status.value in ("found", "no_conflict"):
+            time = judged(result, file)
+            if time < np.inf:
+                print(f"contact at {time:.3f} s, {backend}, {reference}, {result.status.value}: {words}")
+                count["contact"] += 1
+
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(options.crossings):
+            case = crossing(seed)
+            file = Path(folder) / "crossing.xml"
+            file.write_text(case.text, encoding="utf-8")
+            judge(file, backends[seed % 3], "constant", case.words)
+    for file in sorted(options.folder.glob("*.xml")) if options.folder else []:
+        for backend in backends:
+            for reference in options.reference:
+                judge(file, backend, reference, file.name)
+    print(", ".join(f"{n} {name}" for name, n in sorted(count.items())))
+    return int(count["contact"] > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -16,6 +16,7 @@ from tests.roads import SLOW, car, driving, problem, scenario, state
 
 import repair
 from repair import SearchStatus
+from repair.cli.command import main
 
 BACKENDS = ("ego", "casadi", "qptr")
 FOLLOWED = (SearchStatus.FOUND, SearchStatus.NO_CONFLICT)
@@ -202,3 +203,22 @@ def test_a_delayed_obstacle_is_a_later_conflict(write: Callable[[str], Path]) ->
         answer(write(scenario(obstacles=driving(30, x, 0.0, 2.0)))).ttc for x in (40.0, 45.0, 50.0, 55.0)
     ]
     assert (np.diff(times) > 0.0).all()
+
+
+# ------------------------------------------------------------------ what an answer hangs on
+
+
+def test_an_answer_that_hangs_on_the_end_of_a_prediction_says_so(
+    write: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    far = driving(31, 200.0, 0.0, 10.0)  # whose prediction goes on
+    file = write(scenario(obstacles=driving(30, 45.0, 0.0, 2.0, range(1, 11)) + far))
+    gone = answer(file, "ego").to_dict()
+    assert (gone["status"], gone["decided_by"]) == ("no_conflict", "prediction_end")
+    stays = answer(file, "ego", "scene.after_prediction=constant_velocity")
+    end = gone["prediction_end"]
+    assert (end["obstacle_id"], end["ends_s"]) == (30, 1.0)
+    assert stays.ttc <= end["constant_velocity_met_s"] < stays.ttc + 0.1 + 1e-9
+    assert stays.to_dict()["decided_by"] is None
+    assert main(["run", str(file), "--reference", "constant"]) == 0
+    assert "Decided   by the end of a prediction: that of obstacle 30" in capsys.readouterr().out

@@ -120,11 +120,18 @@ def test_where_nothing_could_be_replaced_all_stays_as_it_was(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([*NAMES, "z_blocked"])
 
 
-def test_a_set_that_is_replaced_in_part_has_no_file_that_names_it(tmp_path):
+def test_a_set_that_is_replaced_in_part_has_no_file_that_names_it(tmp_path, monkeypatch):
     write_files(tmp_path, content("a"))
-    (tmp_path / "z_blocked").mkdir()
+    rename = os.replace
+
+    def full(source, target):
+        if Path(target).name == NAMES[-1]:
+            raise OSError(28, "No space left on device")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
     with pytest.raises(OutputError, match="cannot be written"):
-        write_files(tmp_path, {**content("b"), "z_blocked": b"x"})
+        write_files(tmp_path, content("b"))
     assert not (tmp_path / "result.json").exists()
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
 

@@ -111,7 +111,7 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
             around or prepared.source, prepared.conflict, backend, prepared.checker,
             replace(config.search, time_limit=None), visits=around.visits if around else None,
         )  # fmt: skip
-        wanted += ["ttr"] if at_ttr and "ttr" not in wanted else []
+        wanted += ["ttr"] if at_ttr and found.complete and "ttr" not in wanted else []
     driven, t_end, reached = prepared.reference, prepared.t_reference, None
     if found.curve is not None:
         t_rep = float(found.f_ttr or 0.0)

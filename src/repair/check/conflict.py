@@ -45,7 +45,8 @@ def detect_conflict(
         at = on_grid(violation.time + FINEST, dt)  # a time of contact is early by no more than that
         if boxes and violation.reason is Reason.COLLISION and at < violation.time:
             at += dt  # the paper looks at steps
-        candidates.append((at, 1, violation.reason.value, violation.obstacle_id, violation.detail))
+        said = violation.detail if violation.obstacle_id is None else ""
+        candidates.append((at, 1, violation.reason.value, violation.obstacle_id, said))
     if not candidates:
         return Conflict(float("inf")), verdict
     time, _, kind, obstacle, said = min(candidates, key=lambda c: c[:2])

@@ -8,15 +8,20 @@ stands beside files of another set.
 
 from __future__ import annotations
 
-import fcntl
+import errno
 import os
 import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from repair.errors import OutputError
+
+fcntl: Any = None
+with suppress(ImportError):  # elsewhere than on POSIX
+    import fcntl
 
 __all__ = ["write_files"]
 
@@ -65,6 +70,9 @@ def write_files(folder: Path, files: dict[str, bytes], stale: list[str] | None =
 def _put(folder: Path, aside: dict[str, Path], stale: list[str], before: Path) -> None:
     """Rename the files into place, the first one last; where nothing is changed yet all stays as it was."""
     first, *others = aside or [""]
+    for name in (*aside, *stale):
+        if (folder / name).is_dir():
+            raise IsADirectoryError(errno.EISDIR, f"{name} is a folder there")
     parked = False
     if aside and (others or stale):
         with suppress(FileNotFoundError):
@@ -97,6 +105,9 @@ def _alone(folder: Path) -> Iterator[None]:
     The lock is the kernel's, on the folder itself: nothing is left behind, and it ends with its process.
     Where the file system has no locks there is none.
     """
+    if fcntl is None:
+        yield
+        return
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         deadline = time.monotonic() + _PATIENCE

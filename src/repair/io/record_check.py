@@ -140,6 +140,7 @@ _OTHERS: dict[str, Test] = {
     "drawing_file": _maybe(_text),
     "checks_off": _list_of(_text),
     "checked_until_s": _maybe(_number),
+    "prediction_end": _maybe(_table_of(_number)),
     "limits": _table_of(_maybe(_number)),
     "versions": lambda value: isinstance(value, dict),
 }

@@ -12,6 +12,7 @@ import numpy as np
 
 from repair.arrays import column, number
 from repair.backend.base import Capabilities, SolveResult
+from repair.check.beyond import Beyond, met_beyond
 from repair.check.peaks import Peaks
 from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
@@ -20,7 +21,7 @@ from repair.outcome.sentence import checked_until, checks_off, margin_only, one_
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
-from repair.search.result import Probe, SearchResult
+from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["driven_curve", "peaks_to_dict", "probe_peaks", "record_of"]
@@ -59,6 +60,8 @@ def record_of(
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
+    followed = found.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT)
+    beyond = met_beyond(scene, states, prepared.config.checker.clearance) if followed else None
     return {
         "schema": 1,
         "scenario": scene.id,
@@ -67,6 +70,8 @@ def record_of(
         "status": found.status.value,
         "status_sentence": status_sentence(prepared, found),
         "checked_until_s": number(checked_until(prepared, found)),
+        "decided_by": "prediction_end" if beyond is not None else None,
+        "prediction_end": _beyond(beyond),
         "checks_off": list(checks_off(prepared.config.checker)),
         "complete": found.complete,
         "ttc_s": number(conflict.time),
@@ -100,6 +105,16 @@ def record_of(
         "time_s": {name: number(seconds, 6) for name, seconds in phases.items()},
         "config": prepared.config.to_dict(),
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
+    }
+
+
+def _beyond(beyond: Beyond | None) -> dict[str, Any] | None:
+    if beyond is None:
+        return None
+    return {
+        "obstacle_id": beyond.obstacle_id,
+        "ends_s": number(beyond.end),
+        "constant_velocity_met_s": number(beyond.time),
     }
 
 

@@ -46,6 +46,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
         ("Scenario", f"{content['scenario']} ({label})"),
         ("Backend", content["backend"] + (f", preset {preset}" if preset else "")),
         ("Status", f"{content['status']}: {content['status_sentence']}"),
+        *_decided(content),
         ("TTC", _ttc(content)),
         ("F-TTR", _f_ttr(content)),
     ]
@@ -65,6 +66,15 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     else:
         lines.append("Files     none written; --out DIR writes result.json, the solution file and figures")
     return "\n".join(lines)
+
+
+def _decided(content: dict[str, Any]) -> list[tuple[str, str]]:
+    beyond = content.get("prediction_end")
+    if not beyond:
+        return []
+    text = "by the end of a prediction: that of obstacle {obstacle_id} ends at {ends_s:.2f} s; at constant "
+    text += "velocity it would be met at {constant_velocity_met_s:.2f} s (scene.after_prediction)"
+    return [("Decided", text.format(**beyond))]
 
 
 def _ttc(content: dict[str, Any]) -> str:

@@ -10,7 +10,8 @@ __all__ = ["COLUMNS", "SweepSettings", "combinations", "failed_row", "one_line"]
 
 COLUMNS = (
     "file", "backend", "reference", "status", "detail", "conflict", "margin_only", "obstacle_id",
-    "from_behind", "ttc_s", "contact_ttc_s", "checked_until_s", "f_ttr_s", "ttb_s", "ttr_s", "maneuver",
+    "from_behind", "ttc_s", "contact_ttc_s", "checked_until_s", "decided_by", "f_ttr_s", "ttb_s", "ttr_s",
+    "maneuver",
     "peak_deceleration_mps2", "peak_acceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps",
     "largest_residual", "probes", "official_feasible", "official_collision_free", "official_on_road",
     "road_method", "certificate", "load_time_s", "prepare_time_s", "search_time_s", "solve_time_s",

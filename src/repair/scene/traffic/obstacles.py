@@ -2,7 +2,8 @@
 
 What CommonRoad leaves open is settled here, towards the larger occupancy:
 
-- a shape turns about its own centre, which is then moved by the state (commonroad-io's reading);
+- a shape turns about its own centre, which is then moved by the state (commonroad-io's reading), and where
+  that centre is not the position also as a whole;
 - an uncertain position or orientation takes the rectangle that encloses every placement;
 - a missing orientation is the direction of motion;
 - a dynamic obstacle without a prediction stands where it is (noted), or moves on where that is asked for;
@@ -178,8 +179,8 @@ def _read_otherwise(found: list[Obstacle]) -> list[str]:
         )
     if turned:
         notes.append(
-            f"{_named(turned)}: a body that is not centred on its position turns about its own centre, as in "
-            "CommonRoad's own collision check"
+            f"{_named(turned)}: a body that is not centred on its position counts twice: turned about its "
+            "own centre, as in CommonRoad's own collision check, and turned as a whole"
         )
     return notes
 

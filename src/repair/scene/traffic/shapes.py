@@ -1,6 +1,7 @@
 """Where a CommonRoad shape is: placed exactly, uncertainly, or given in the plane.
 
-A shape turns about its own centre, which is then moved by the state: commonroad-io's own reading.
+A shape turns about its own centre, which is then moved by the state: commonroad-io's own reading. Where that
+centre is not the body's position it is there a second time, turned with the body.
 """
 
 from __future__ import annotations
@@ -173,8 +174,7 @@ def place(shape: Any, position: Array, heading: float, speed: float) -> Placed:
 def enclosing(shape: Any, area: Any, low: float, high: float, speed: float) -> Placed:
     """Rectangle around every placement with the position in ``area`` and the heading in [low, high].
 
-    Around all that :func:`place` makes of them: each part turns about its own centre, and the centre's offset
-    from the position does not turn.
+    Around all that :func:`place` makes of them.
     """
     heading = (low + high) / 2.0
     spread = min((high - low) / 2.0, np.pi)
@@ -199,19 +199,30 @@ def enclosing(shape: Any, area: Any, low: float, high: float, speed: float) -> P
 
 
 def _reach(part: Any, heading: float, spread: float) -> tuple[Array, Array]:
-    """Lowest and highest coordinates (2,) of a part turned by ``heading`` +- ``spread``, in axes along it."""
+    """Lowest and highest coordinates (2,) of a part turned by ``heading`` +- ``spread``, in axes along it.
+
+    Turned about its own centre, and about the body's position.
+    """
     center = _center_of(part)
-    body = np.concatenate(outlines(part, -center, 0.0))
-    radius = np.hypot(body[:, 0], body[:, 1])
-    angle = np.arctan2(body[:, 1], body[:, 0])
+    c, s = np.cos(heading), np.sin(heading)
+    middle = center @ np.array([[c, -s], [s, c]])
+    own = _swept(np.concatenate(outlines(part, -center, 0.0)), spread)
+    lowest, highest = middle - own[2:], middle + own[:2]
+    if float(np.hypot(*center)) > _OFF_CENTRE:
+        whole = _swept(np.concatenate(outlines(part, np.zeros(2), 0.0)), spread)
+        lowest, highest = np.minimum(lowest, -whole[2:]), np.maximum(highest, whole[:2])
+    return lowest, highest
+
+
+def _swept(body: Array, spread: float) -> Array:
+    """How far corners (K, 2), turned by up to ``spread`` either way, reach along x, y, -x and -y (4,)."""
+    radius, angle = np.hypot(body[:, 0], body[:, 1]), np.arctan2(body[:, 1], body[:, 0])
     # a corner sweeps an arc; its extreme along an axis is inside the arc or at one end
     reach = []
     for axis in (0.0, np.pi / 2, np.pi, -np.pi / 2):
         off = np.abs((angle - axis + np.pi) % (2 * np.pi) - np.pi)
         reach.append(float(np.max(radius * np.cos(np.maximum(off - spread, 0.0)))))
-    c, s = np.cos(heading), np.sin(heading)
-    middle = center @ np.array([[c, -s], [s, c]])
-    return middle - reach[2:], middle + reach[:2]
+    return np.array(reach)
 
 
 def off_centre(shape: Any) -> bool:
