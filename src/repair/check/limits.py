@@ -145,24 +145,48 @@ def plane_excess(
     """
     if not len(samples):
         return []
-    times = samples.t
-    if len(times) > 1:
-        count = max(1, round(float(times[1] - times[0]) / _FINE))
-        samples = curve.sample(np.linspace(times[0], times[-1], (len(times) - 1) * count + 1))
-        times = samples.t
+    rows = _against(samples, frame, limits, vehicle, tolerance)
+    if len(samples) > 1:
+        fine = _fine(samples.t, np.logical_or.reduce([_may_exceed(value, most) for value, most, _ in rows]))
+        if not len(fine):
+            return []
+        samples = curve.sample(fine)
+        rows = _against(samples, frame, limits, vehicle, tolerance)
+    return [
+        Excess(float(samples.t[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
+        for value, most, text in rows
+        if not float(value.max()) <= most + ROUNDING
+    ]
+
+
+def _may_exceed(value: Array, most: float) -> Array:
+    """Between which samples (K - 1,) a value may exceed: it swings by no more than around that interval."""
+    swing = np.abs(value[1:] - value[:-1])
+    around = swing.copy()
+    np.maximum(around[1:], swing[:-1], out=around[1:])
+    np.maximum(around[:-1], swing[1:], out=around[:-1])
+    return np.asarray(~(np.maximum(value[1:], value[:-1]) + around <= most))
+
+
+def _fine(times: Array, chosen: Array) -> Array:
+    """Times every millisecond in the chosen ones of the intervals between ``times``, ends included."""
+    step = float(times[1] - times[0])
+    inner = np.linspace(0.0, step, max(1, round(step / _FINE)) + 1)
+    return np.unique((times[:-1][chosen][:, None] + inner).ravel())
+
+
+def _against(
+    samples: FrenetTrajectory, frame: FrenetFrame, limits: Limits, vehicle: Vehicle, tolerance: float
+) -> tuple[tuple[Array, float, str], ...]:
+    """What is measured at samples (K,), what it may be at most, and the words for it."""
     along, across = plane_accelerations(frame, samples)
     (s, l), (v, w) = samples.position.T, samples.velocity.T  # noqa: E741
     engine = vehicle.engine_acceleration(np.hypot((1.0 - frame.curvature(s) * l) * v, w))
     more, c = 1.0 + tolerance, limits
-    rows = (
+    return (
         (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}"),
         (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}"),
         (along / engine, 1.0, "needs {:.2f} of what the engine gives at that speed, {:.2f}"),
         (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}"),
         (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}"),
     )
-    return [
-        Excess(float(times[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
-        for value, most, text in rows
-        if not float(value.max()) <= most + ROUNDING
-    ]

@@ -105,7 +105,7 @@ def _certificate(result: Any) -> str:
     with tempfile.TemporaryDirectory() as folder:
         result.save(folder, figure=False)
         certificate = certify(Path(folder))
-    return "; ".join(row.name for row in certificate.rows if not row.ok) or "ok"
+    return "; ".join(row.name for row in certificate.rows if row.claim and not row.ok) or "ok"
 
 
 def _official(result: Any) -> dict[str, Any]:
