@@ -26,7 +26,7 @@ def checks_off(config: CheckerConfig) -> tuple[str, ...]:
         for name in ("road", "limits", "margin")
         if getattr(usual, name, False) is True and getattr(config, name) is False
     ]
-    if getattr(usual, "clearance", 0.0) > 0.0 and getattr(config, "clearance", 1.0) <= 0.0:
+    if usual.clearance > 0.0 and config.clearance <= 0.0 and not config.margin:
         off.append("safety margin")
     if config.official == "never":
         off.append("drivability checker")
