@@ -293,7 +293,7 @@ OF_REPAIRS = {
     ),
 }
 
-DEV = (pytest.mark.slow, pytest.mark.scenarios)
+DEV = (pytest.mark.exhaustive, pytest.mark.scenarios)
 CASES = [
     *((name, mutation) for name in ("casadi", "no_conflict") for mutation in MUTATIONS),
     *((name, mutation) for name in ("casadi",) for mutation in OF_REPAIRS),
