@@ -116,7 +116,14 @@ def _stated(occupancies, first: int, dt: float, t: np.ndarray):
 
 
 def contact_time(
-    ego: Ego, scenario, first: int, until: float, *, since: float = 0.0, deeper: float = 0.0
+    ego: Ego,
+    scenario,
+    first: int,
+    until: float,
+    *,
+    since: float = 0.0,
+    deeper: float = 0.0,
+    apart: frozenset[int] = frozenset(),
 ) -> float:
     """First time [s] at which the ego meets an obstacle by more than ``deeper`` [m]; inf if never."""
     keep = (ego.t >= since - 1e-9) & (ego.t <= until + 1e-9)
@@ -124,6 +131,8 @@ def contact_time(
     low, high = ego.poses[keep, :2].min(axis=0) - 10.0, ego.poses[keep, :2].max(axis=0) + 10.0
     best = np.inf
     for obstacle in [*scenario.static_obstacles, *scenario.dynamic_obstacles]:
+        if obstacle.obstacle_id in apart:
+            continue
         prediction = getattr(obstacle, "prediction", None)
         start = obstacle.initial_state
         if prediction is None:
@@ -152,10 +161,16 @@ def judged(result, file) -> float:
     from vehiclemodels import parameters_vehicle1
 
     scenario, problems = CommonRoadFileReader(str(file)).open()
-    first = next(iter(problems.planning_problem_dict.values())).initial_state.time_step
+    start = next(iter(problems.planning_problem_dict.values())).initial_state
+    first = start.time_step
+    recorded = frozenset(  # who starts in the ego's own place is its recording, and no traffic
+        other.obstacle_id
+        for other in scenario.dynamic_obstacles
+        if np.hypot(*(np.asarray(other.initial_state.position) - start.position)) < 0.1
+    )
     states = result.trajectory.state_list
     ego = ego_of(states, scenario.dt, parameters_vehicle1.parameters_vehicle1())
-    return contact_time(ego, scenario, first, (len(states) - 1) * scenario.dt)
+    return contact_time(ego, scenario, first, (len(states) - 1) * scenario.dt, apart=recorded)
 
 
 def main() -> int:
