@@ -286,7 +286,16 @@ def test_initial_states_that_lack_something(refused: Any, missing: str) -> None:
     """commonroad-io itself would go on with zeros: the ego at the origin, facing east, standing."""
     lacking = state(20.0, 0.0, leave=[missing])
     refused(scenario(problems=problem(start=lacking)), f"planningProblem 100 has no {missing}")
-    refused(scenario(obstacles=car(30, lacking)), f"dynamicObstacle 30 has no {missing}")
+    if missing != "velocity":
+        refused(scenario(obstacles=car(30, lacking)), f"dynamicObstacle 30 has no {missing}")
+
+
+def test_an_obstacle_need_not_say_how_fast_it_starts(load: Any) -> None:
+    """The XSD of 2020a has it optional for obstacles; where they are is what counts."""
+    silent = SLOW.replace("<velocity><exact>2.0</exact></velocity>", "", 1)
+    assert silent != SLOW
+    told, untold = load(scenario()), load(scenario(obstacles=silent))
+    np.testing.assert_array_equal(told.obstacles[0].rectangles, untold.obstacles[0].rectangles)
 
 
 def test_missing_yaw_in_a_prediction_is_the_direction_of_motion(load: Any) -> None:

@@ -21,7 +21,7 @@ _SIZE_MAX = 200_000_000  # bytes
 _TIME_STEP = (1e-3, 10.0)  # smallest and largest [s]
 _NEEDED = {
     "planningProblem": ("position", "orientation", "velocity", "time"),
-    "dynamicObstacle": ("position", "orientation", "velocity", "time"),
+    "dynamicObstacle": ("position", "orientation", "time"),
     "staticObstacle": ("position", "orientation"),
 }
 #: The first release of commonroad-io that lacks what the drivability checker imports.
