@@ -13,7 +13,12 @@ __all__ = ["CheckerConfig"]
 class CheckerConfig:
     """The feasibility check."""
 
-    substeps: int = setting(4, "samples per scenario step between which nothing is looked at", low=1, high=50)
+    substeps: int = setting(
+        4,
+        "samples per scenario step at which the road is looked at and the ego's curve is followed",
+        low=1,
+        high=50,
+    )
     official: str = setting(
         "leftover",
         "which transitions the drivability checker is asked about: those left over, all, or none",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repair.arrays import Array
+from repair.arrays import Array, wrap
 from repair.errors import ReferenceTrajectoryError
 from repair.vehicle.parameters import Vehicle
 
@@ -134,7 +134,7 @@ def require_start(recording: Recording, x: float, y: float, heading: float, spee
             f"{recording.what} starts {off:.4g} m from the ego's initial position (time step "
             f"{recording.first}; at most {START_OFF:g} m along either axis)"
         )
-    turned = abs(_wrapped(recording.headings[0] - heading))
+    turned = abs(wrap(recording.headings[0] - heading))
     if turned > START_HEADING_OFF:
         raise ReferenceTrajectoryError(
             f"{recording.what} starts {turned:.3g} rad off the ego's initial heading (time step "
@@ -158,10 +158,6 @@ def _first(recording: Recording, excess: Array, says: Callable[[int], str], shif
     if wrong.any():
         k = int(np.argmax(wrong))
         _refuse(recording, k + shift, says(k))
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _displacements(recording: Recording) -> Array:
@@ -191,7 +187,7 @@ def _velocities(recording: Recording, dt: float) -> None:
 
 def _turns(recording: Recording, dt: float, vehicle: Vehicle) -> None:
     """How far the body turns in a step, against what steering and friction allow."""
-    turned = np.abs(_wrapped(np.diff(recording.headings)))
+    turned = np.abs(wrap(np.diff(recording.headings)))
     moved = np.hypot(*np.diff(recording.positions, axis=0).T)
     speed = np.abs(recording.speeds[:-1])
     steered = 2.0 * (speed + vehicle.a_max * dt) * vehicle.steering_rate_max / vehicle.wheelbase * dt**2
@@ -214,7 +210,7 @@ def _turns(recording: Recording, dt: float, vehicle: Vehicle) -> None:
 def _along_and_across(recording: Recording) -> tuple[Array, Array]:
     """How far each step leads along the mean of its ends' directions, and to the left of it (K - 1,) [m]."""
     displacement = _displacements(recording)
-    middle = recording.directions[:-1] + 0.5 * _wrapped(np.diff(recording.directions))
+    middle = recording.directions[:-1] + 0.5 * wrap(np.diff(recording.directions))
     cos, sin = np.cos(middle), np.sin(middle)
     x, y = displacement.T
     return cos * x + sin * y, cos * y - sin * x
@@ -223,7 +219,7 @@ def _along_and_across(recording: Recording) -> tuple[Array, Array]:
 def _speeds(recording: Recording, dt: float, a_max: float) -> None:
     """How far a step goes along its heading, against the speed at its start."""
     along, _ = _along_and_across(recording)
-    turn = np.abs(_wrapped(np.diff(recording.directions)))
+    turn = np.abs(wrap(np.diff(recording.directions)))
     stated = recording.speeds[:-1]
     # A chord is shorter than its arc by a share of turn² / 24.
     allowed = 0.5 * a_max * dt + POSITION_OFF / dt + np.abs(stated) * (turn**2 / 20.0 + 0.5 * HEADING_OFF**2)

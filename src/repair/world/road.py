@@ -1,6 +1,6 @@
 """The edge of the road: whether the ego's oriented rectangle lies properly inside.
 
-The verdicts are at least as strict as those of the drivability checker
+Without closed gaps the verdicts are at least as strict as those of the drivability checker
 (``commonroad_dc.feasibility.solution_checker``), see :class:`RoadBoundary`.
 """
 

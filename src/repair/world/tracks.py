@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, Points
+from repair.arrays import Array, Points, wrap
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
@@ -168,7 +168,7 @@ def _interpolated(rows: Array, before: Index, after: Index, substeps: int) -> Ar
     weight = (np.arange(len(before)) % substeps / substeps)[:, None]
     left, right = rows[before], rows[after]
     change = right - left
-    change[:, 2] = (change[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    change[:, 2] = wrap(change[:, 2])
     return np.where(weight > 0.0, left + weight * change, left)
 
 
