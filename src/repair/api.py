@@ -17,7 +17,7 @@ from repair.config.load import load_config
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve, SplicedCurve
 from repair.deadline import OutOfTime, until
-from repair.errors import BackendError, ConfigError, OutputError, RepairError, in_words, kind_of, path_of
+from repair.errors import BackendError, ConfigError, OutputError, RepairError, foreign, kind_of, path_of
 from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
 from repair.io.destination import require_folder
 from repair.metrics.base import Asked, MetricValue
@@ -188,14 +188,8 @@ def repair(
 
 def _made(config: Config) -> RepairBackend:
     """The backend that is asked for; whatever its factory raises is an error of the backend."""
-    try:
+    with foreign(f"making backend {config.backend!r}", BackendError):
         return make_backend(config.backend, config)
-    except RepairError:
-        raise
-    except Exception as error:
-        raise BackendError(
-            f"backend {config.backend!r} cannot be made: {type(error).__name__}: {in_words(error)}"
-        ) from error
 
 
 def search(

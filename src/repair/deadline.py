@@ -13,17 +13,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from threading import Lock
 
+from repair.errors import OutOfTime
+
 __all__ = ["Estimate", "OutOfTime", "held", "in_time", "limited", "time_left", "until"]
 
 _NEVER = float("inf")
 _AT: ContextVar[float] = ContextVar("repair.deadline", default=_NEVER)
-
-
-class OutOfTime(Exception):
-    """The deadline has passed, or what comes next would not end before it.
-
-    Ours alone: a TimeoutError may come out of a backend, and would be its bug.
-    """
 
 
 @contextmanager

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 __all__ = [
     "BackendError",
     "ConfigError",
+    "OutOfTime",
     "OutputError",
     "ReferenceTrajectoryError",
     "RepairError",
     "ScenarioError",
+    "foreign",
     "in_words",
     "kind_of",
     "path_of",
@@ -41,6 +45,33 @@ class BackendError(RepairError):
 
 class OutputError(RepairError):
     """A result cannot be written."""
+
+
+class OutOfTime(Exception):
+    """The deadline has passed, or what comes next would not end before it.
+
+    It is caught inside of the package. Ours alone: a TimeoutError may come out of a backend, and would be
+    its bug.
+    """
+
+
+@contextmanager
+def foreign(what: str, error: type[RepairError]) -> Iterator[None]:
+    """Whatever a part raises that another program may have brought is an error that names the part.
+
+    Parameters
+    ----------
+    what : str
+        The part, to begin the sentence with: ``check 'comfort'``.
+    error : type
+        What is raised then.
+    """
+    try:
+        yield
+    except (RepairError, OutOfTime):
+        raise
+    except Exception as raised:
+        raise error(f"{what} failed: {type(raised).__name__}: {in_words(raised)}") from raised
 
 
 def in_words(thing: object, most: int = 200) -> str:

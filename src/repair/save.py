@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from repair.errors import OutputError
+from repair.errors import OutputError, foreign
 from repair.io.commonroad import no_solution_because, to_solution
 from repair.io.files import write_files
 from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_json
@@ -151,13 +151,14 @@ def saved(result: Saved, folder: Path) -> tuple[Outcome, list[Path]]:
     Raises
     ------
     OutputError
-        If the folder or a file in it cannot be written; nothing half-written is left.
+        If a format fails, or the folder or a file in it cannot be written; nothing half-written is left.
     """
     record = dict(result.outcome.record)
     files: dict[str, bytes] = {}
     stale: list[str] = []
-    for _, written in FORMATS.items():
-        made = loaded(written)(result)
+    for name, written in FORMATS.items():
+        with foreign(f"format {name!r}", OutputError):
+            made = loaded(written)(result)
         record.update(made.record)
         files.update(made.files)
         stale += made.stale

@@ -19,12 +19,16 @@ import repair
 from repair.api import prepare
 from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.backend.guard import Guarded
+from repair.check.registry import CHECKS
 from repair.config.load import load_config
 from repair.curves.base import FrenetTrajectory
 from repair.errors import BackendError, RepairError, in_words, path_of
+from repair.metrics.registry import METRICS
+from repair.reference.registry import SOURCES
 from repair.report.birdseye import birdseye_figure
 from repair.report.profiles import profile_figure
 from repair.report.text import summary
+from repair.save import FORMATS
 from repair.scene import reading
 from repair.solvers.registry import BACKENDS, make_backend
 from repair.study.rows import SweepSettings
@@ -273,10 +277,60 @@ def test_a_backend_that_cannot_be_made(scene):
 
     repair.register_backend("strange", factory)
     try:
-        with pytest.raises(BackendError, match="'strange' cannot be made: KeyError"):
+        with pytest.raises(BackendError, match="making backend 'strange' failed: KeyError"):
             repair.repair(scene, overrides=CONSTANT, backend="strange")
     finally:
         BACKENDS.unregister("strange")
+
+
+def fails(*_):
+    raise ZeroDivisionError("oh")
+
+
+@pytest.mark.parametrize("what", ["no list", [3], fails], ids=["text", "number", "raises"])
+def test_a_check_that_is_none_is_named(what, scene):
+    repair.register_check("strange", what if callable(what) else lambda driven: what)
+    try:
+        with pytest.raises(RepairError, match="check 'strange'"):
+            repair.repair(scene, overrides=[*CONSTANT, "checker.extra=[strange]"])
+    finally:
+        CHECKS.unregister("strange")
+
+
+def test_a_metric_that_raises_is_named(scene):
+    repair.register_metric("strange", fails)
+    try:
+        with pytest.raises(RepairError, match="metric 'strange' failed: ZeroDivisionError: oh"):
+            repair.repair(scene, overrides=[*CONSTANT, "metrics=[strange]"])
+    finally:
+        METRICS.unregister("strange")
+
+
+def test_a_reference_source_that_raises_is_named(scene):
+    repair.register_reference("strange", fails)
+    try:
+        with pytest.raises(RepairError, match="reference source 'strange' failed: ZeroDivisionError: oh"):
+            repair.repair(scene, overrides=["reference.source=strange"])
+    finally:
+        SOURCES.unregister("strange")
+
+
+def test_a_format_that_raises_is_named(scene, tmp_path):
+    repair.register_format("strange", fails)
+    try:
+        with pytest.raises(RepairError, match="format 'strange' failed: ZeroDivisionError: oh"):
+            repair.repair(scene, overrides=CONSTANT).save(tmp_path, figure=False)
+    finally:
+        FORMATS.unregister("strange")
+    assert not list(tmp_path.iterdir())
+
+
+def test_settings_of_metrics_that_nobody_asks_for_are_noted(scene):
+    keys = [*CONSTANT, "evasive.a_brake=7.0"]
+    idle = repair.repair(scene, overrides=keys).to_dict()
+    assert "evasive.a_brake has no effect with metrics=[]" in idle["notes"]
+    asked = repair.repair(scene, overrides=[*keys, "metrics=[ttb]"]).to_dict()
+    assert not [note for note in asked["notes"] if "no effect" in note]
 
 
 def test_what_a_backend_raises_on_purpose_goes_through(scene, registered):

@@ -10,8 +10,7 @@ import numpy as np
 
 from repair.backend.base import Closest, RepairBackend, SolveResult, SolveStatus
 from repair.curves.base import Curve, FrenetTrajectory
-from repair.deadline import OutOfTime
-from repair.errors import BackendError, RepairError, in_words, kind_of
+from repair.errors import BackendError, foreign, in_words, kind_of
 from repair.problem.problem import RepairProblem
 from repair.timegrid import STEP
 
@@ -49,15 +48,8 @@ class Guarded:
             If the backend raises, or gives no :class:`SolveResult`, or one with a curve that is none, is
             not finite, or does not reach from ``t_rep`` to ``t_end``.
         """
-        try:
+        with foreign(f"backend {self.name!r}, at t_rep = {problem.t_rep:g} s,", BackendError):
             answer: Any = self.backend.solve(problem, warm_start=warm_start, time_limit=time_limit)
-        except (RepairError, OutOfTime):
-            raise
-        except Exception as error:  # whatever a foreign solver raises
-            raise BackendError(
-                f"backend {self.name!r} failed at t_rep = {problem.t_rep:g} s: "
-                f"{type(error).__name__}: {in_words(error)}"
-            ) from error
         if why := _wrong(answer, problem):
             raise BackendError(f"backend {self.name!r}: its solve gave {why} at t_rep = {problem.t_rep:g} s")
         assert isinstance(answer, SolveResult)

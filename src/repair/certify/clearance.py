@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,16 +17,17 @@ from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
     from repair.curves.bernstein import BernsteinCurve
-    from repair.preparation import Prepared
 
-__all__ = ["allowed_depth", "clearance_rows"]
+_NAME = "distance to the nearest inflated obstacle"
+
+__all__ = ["boxes_kept", "clearance_rows"]
 
 
-def allowed_depth(content: Mapping[str, Any], prepared: Prepared) -> float:
-    """How far into the inflated boxes the repair may go [m, negative]: a hard backend says itself.
+def boxes_kept(content: Mapping[str, Any]) -> float | None:
+    """How far into the inflated boxes a repair says that it may go [m, negative]; None if it says nothing.
 
-    Boxes in (s, l) are wider than the vehicles in them; a soft backend may enter them as far as the
-    most that hard ones are allowed to (``repair.relax``), and the true rectangles have a row of their own.
+    Boxes in (s, l) are wider than the vehicles in them. A hard backend keeps out of them, up to the margin
+    that its feasible solve names; a soft one promises nothing of them, and is judged by the true shapes.
     """
     best = [p for p in content["probes"] if p["feasible"] and p["t_rep_s"] == content["f_ttr_s"]]
     said = content.get("capabilities")
@@ -33,17 +35,23 @@ def allowed_depth(content: Mapping[str, Any], prepared: Prepared) -> float:
     hard = bool(best) and (
         said.get("keeps_hull", False) if said else "obstacles" in best[0].get("residuals", {})
     )
-    if hard and best[0].get("margin_m") is not None:
-        return min(0.0, float(best[0]["margin_m"]))
-    return min([0.0, *prepared.config.repair.relax])
+    if not hard:
+        return None
+    return min(0.0, float(best[0].get("margin_m") or 0.0))
 
 
 def clearance_rows(
-    curve: UniformBSpline | BernsteinCurve, occupancy: Occupancy, dt: float, t_end: float, allowed: float
+    curve: UniformBSpline | BernsteinCurve,
+    occupancy: Occupancy,
+    dt: float,
+    t_end: float,
+    allowed: float | None,
+    at_steps: bool = False,
 ) -> list[CertificateRow]:
     """Distance to the nearest inflated box, by hull and by sampling; negative inside of it.
 
-    ``allowed`` is how far into a box the repair may go at most.
+    ``allowed`` is how far into a box the repair may go at most; with None the distance is told only, but for
+    the scenario's own steps where ``at_steps`` (``checker.margin``, which is judged at these).
 
     The distance to a box is the largest of the four signed distances to its sides. Pieces are cut at
     the scenario's steps: in between the sides move linearly, and the Bernstein points of curve minus
@@ -68,20 +76,32 @@ def clearance_rows(
     fine = cut_pieces(points[piece], u0, u1)
     sides_start, sides_end = _sides(occupancy, start), _sides(occupancy, end)
     share = np.linspace(0.0, 1.0, fine.shape[1])[None, :, None]
-    least, sampled = np.inf, np.inf
-    at = curve.sample(edges).position
-    at_sides = _sides(occupancy, edges)
+    least, sampled, stepped = np.inf, np.inf, np.inf
+    at, on = curve.sample(edges).position, curve.sample(steps).position
+    at_sides, on_sides = _sides(occupancy, edges), _sides(occupancy, steps)
     for k in range(len(occupancy)):
         line = (1.0 - share) * sides_start[k][:, None] + share * sides_end[k][:, None]
         distance = np.max(np.min(_signed(fine) - line, axis=1), axis=1)
         least = min(least, float(np.nanmin(distance, initial=np.inf)))
-        sampled = min(sampled, float(np.nanmin(np.max(_signed(at) - at_sides[k], axis=-1), initial=np.inf)))
+        sampled = min(sampled, _nearest(at, at_sides[k]))
+        stepped = min(stepped, _nearest(on, on_sides[k]))
     if not np.isfinite(sampled):
         return []
-    return [
-        at_least("distance to the nearest inflated obstacle", least, allowed, "exact", "m"),
-        at_least("distance to the nearest inflated obstacle", sampled, allowed, "sampled", "m"),
+    limit = 0.0 if allowed is None else allowed
+    rows = [
+        at_least(_NAME, least, limit, "exact", "m"),
+        at_least(_NAME, sampled, limit, "sampled", "m"),
     ]
+    if allowed is None:
+        rows = [replace(row, claim=False) for row in rows]
+    if at_steps:
+        rows.append(at_least(f"{_NAME}, at the steps", stepped, 0.0, "sampled", "m"))
+    return rows
+
+
+def _nearest(position: Array, sides: Array) -> float:
+    """The least distance to one box at these instants."""
+    return float(np.nanmin(np.max(_signed(position) - sides, axis=-1), initial=np.inf))
 
 
 def _sides(occupancy: Occupancy, times: Array) -> Array:

@@ -89,9 +89,12 @@ def _missed(states: States, dt: float, vehicle: Vehicle) -> tuple[float, float]:
 
 
 def weakened(limits: Limits, usual: Limits) -> list[str]:
-    """Limits that allow more than those that hold where nothing is asked for, in words."""
+    """Limits that allow more than those that hold where nothing is asked for, in words.
+
+    Not ``a_max``: the engine is judged whatever is asked for (``vehicle: engine and brakes``).
+    """
     found = []
-    for name in ("v_max", "v_lat", "a_max", "a_lat", "a_total", "j_lon", "j_lat", "curvature"):
+    for name in ("v_max", "v_lat", "a_lat", "a_total", "j_lon", "j_lat", "curvature"):
         value, most = getattr(limits, name), getattr(usual, name)
         if value > most * (1.0 + 1e-9):
             found.append(f"limits.{name}={value:g} (usual: {most:g})")

@@ -58,7 +58,7 @@ def contact_rows(
     half = vehicle.half_length, vehicle.half_width
     met = _worst([first_meeting(way, half, traffic.bodies, dt) for way in ways])
     near = f"; nearest {met.distance:.3f} m{_whom(met.nearest)}" if 0.0 < met.distance < np.inf else ""
-    rows = [_free("first contact of the rectangles", met, t_end, near)]
+    rows = [_free("first contact of the shapes", met, t_end, near)]
     margin = float(prepared.config.checker.clearance)
     if margin > 0.0:
         wide = half[0] + margin, half[1] + margin

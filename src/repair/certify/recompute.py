@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.certify.certificate import Certificate, CertificateRow
-from repair.certify.clearance import allowed_depth, clearance_rows
+from repair.certify.clearance import boxes_kept, clearance_rows
 from repair.certify.hull import derivative_rows, seam_rows
 from repair.certify.limits import driven_rows, physical_rows, weakened
 from repair.certify.motion import States, along_curve, through_states
@@ -103,8 +103,8 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
         rows += seam_rows(prepared.reference, curve, t_rep)
         said = content.get("capabilities") or {}
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
-        allowed = allowed_depth(content, prepared)
-        rows += clearance_rows(curve, prepared.occupancy, dt, t_end, allowed)
+        allowed, margin = boxes_kept(content), prepared.config.checker.margin
+        rows += clearance_rows(curve, prepared.occupancy, dt, t_end, allowed, margin)
     rows += driven_rows(planned, prepared.limits, reference=curve is None)
     rows += physical_rows(states, dt, scene.vehicle)
     rows += contact_rows(prepared, ways, traffic, t_rep)

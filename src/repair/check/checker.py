@@ -15,7 +15,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.limits import Excess, curve_excess, plane_excess, surely_kept
 from repair.check.peaks import Peaks, peaks
-from repair.check.registry import CHECKS, Driven
+from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
 from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve, FrenetTrajectory
@@ -66,7 +66,7 @@ class Checker:
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: _Followed | None = None
-        self._checks = [CHECKS[name] for name in config.extra]
+        self._checks = {name: CHECKS[name] for name in config.extra}
         self._beside = self._met_at_start(config.clearance) if config.clearance else frozenset()
 
     def times(self, t_end: float) -> Array:
@@ -315,7 +315,7 @@ class Checker:
             return []
         states = self.scene.model.states(path.t, path.xy, path.speed, slip, orientation)
         driven = Driven(problem, path, states, late)
-        return [violation for check in self._checks for violation in check(driven)]
+        return violations_of(self._checks, driven)
 
 
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))

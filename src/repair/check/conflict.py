@@ -32,7 +32,7 @@ def detect_conflict(
     dt = checker.scene.dt
     verdict = checker.check_reference(reference, t_end)
     contact = checker.contact(reference, t_end)
-    candidates: list[tuple[float, int, str, int | None, str]] = []
+    candidates: list[tuple[float, int, str, int | None, str, float]] = []
     boxes = checker.config.conflict == "boxes"
     if boxes:
         steps = min(steps_until(t_end, dt), checker.scene.n_steps)
@@ -40,17 +40,18 @@ def detect_conflict(
         entry = first_entry(occupancy, sampled)
         if entry is not None:
             who = int(occupancy.ids[entry[1]])
-            candidates.append((float(sampled.t[entry[0]]), 0, "margin", who, ""))
+            at = float(sampled.t[entry[0]])
+            candidates.append((at, 0, "margin", who, "", at))
     for violation in verdict.violations:
         at = on_grid(violation.time + FINEST, dt)  # a time of contact is early by no more than that
         if boxes and violation.reason is Reason.COLLISION and at < violation.time:
             at += dt  # the paper looks at steps
         said = violation.detail if violation.obstacle_id is None else ""
-        candidates.append((at, 1, violation.reason.value, violation.obstacle_id, said))
+        candidates.append((at, 1, violation.reason.value, violation.obstacle_id, said, violation.time))
     if not candidates:
         return Conflict(float("inf")), verdict
-    time, _, kind, obstacle, said = min(candidates, key=lambda c: c[:2])
+    time, _, kind, obstacle, said, exact = min(candidates, key=lambda c: c[:2])
     if contact is None:
-        return Conflict(time, kind, obstacle, detail=said), verdict
+        return Conflict(time, kind, obstacle, detail=said, exact_time=exact), verdict
     touched = contact.time, contact.obstacle_id, contact.from_behind
-    return Conflict(time, kind, obstacle, *touched, said), verdict
+    return Conflict(time, kind, obstacle, *touched, said, exact), verdict

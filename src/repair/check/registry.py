@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from repair.check.verdict import Violation
 from repair.curves.plane import CartesianPath
-from repair.errors import ConfigError
+from repair.errors import ConfigError, foreign, in_words, kind_of
 from repair.problem.problem import RepairProblem
 from repair.registry import Registry
 from repair.vehicle.states import DrivenStates
 
-__all__ = ["CHECKS", "Check", "Driven", "register"]
+__all__ = ["CHECKS", "Check", "Driven", "register", "violations_of"]
 
 
 @dataclass(frozen=True)
@@ -52,3 +53,23 @@ def register(name: str, check: Check) -> None:
         If the name is taken.
     """
     CHECKS.register(name, check)
+
+
+def violations_of(checks: Mapping[str, Check], driven: Driven) -> list[Violation]:
+    """What all these checks say.
+
+    Raises
+    ------
+    ConfigError
+        If one of them raises, or says something else than :class:`Violation`; the sentence names it.
+    """
+    found: list[Violation] = []
+    for name, check in checks.items():
+        with foreign(f"check {name!r}", ConfigError):
+            said: Any = check(driven)
+        if not isinstance(said, Sequence):
+            raise ConfigError(f"check {name!r} gave {kind_of(said)}; it has to give a list of violations")
+        if strange := [one for one in said if not isinstance(one, Violation)]:
+            raise ConfigError(f"check {name!r} gave {in_words(strange[0])} among its violations")
+        found += said
+    return found

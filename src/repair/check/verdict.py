@@ -74,6 +74,9 @@ class Conflict:
         The obstacle strikes the ego from behind.
     detail : str
         What is violated, in words: where the road is left and by how much, which limit is exceeded.
+    exact_time : float
+        When the violation begins between the scenario's steps [s]: contact and margins in continuous time,
+        early by 1 ms at most, the rest at the samples; ``time`` for boxes, which are looked at in steps.
     """
 
     time: float
@@ -83,3 +86,4 @@ class Conflict:
     contact_id: int | None = None
     from_behind: bool = False
     detail: str = ""
+    exact_time: float = float("inf")

@@ -87,6 +87,8 @@ class Config:
             owner = key.name.split(".", 1)[0]
             if key.name in self.given and owner in backend_names() and owner != self.backend:
                 yield key.name, "backend", self.backend
+            if key.name in self.given and owner == "evasive" and not self.metrics and self.driver == "f_ttr":
+                yield key.name, "metrics", "[]"
 
     def __new__(cls, *args: Any, **keys: Any) -> Config:
         """Made as its full type, with the sections of all backends."""

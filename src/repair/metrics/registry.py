@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from repair.errors import ConfigError
+from repair.errors import ConfigError, foreign
 from repair.metrics.base import Asked, Metric, MetricValue
 from repair.registry import Registry, loaded
 
@@ -40,11 +40,12 @@ def measure(names: Sequence[str], asked: Asked) -> dict[str, MetricValue]:
     Raises
     ------
     ConfigError
-        If a metric gives something else than a :class:`MetricValue`.
+        If a metric raises, or gives something else than a :class:`MetricValue`.
     """
     found: dict[str, MetricValue] = {}
     for name in names:
-        value = loaded(METRICS[name])(asked)
+        with foreign(f"metric {name!r}", ConfigError):
+            value = loaded(METRICS[name])(asked)
         if not isinstance(value, MetricValue):
             raise ConfigError(f"metric {name!r} gave {type(value).__name__}; it has to give a MetricValue")
         found[name] = value

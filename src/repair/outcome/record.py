@@ -75,6 +75,7 @@ def record_of(
         "checks_off": list(checks_off(prepared.config.checker)),
         "complete": found.complete,
         "ttc_s": number(conflict.time),
+        "exact_ttc_s": number(conflict.exact_time),
         "contact_ttc_s": number(conflict.contact_time),
         "f_ttr_s": number(found.f_ttr) if found.curve is not None else None,
         "conflict": {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from repair.arrays import Array
 from repair.curves.base import Curve
-from repair.errors import ConfigError, ReferenceTrajectoryError
+from repair.errors import ConfigError, ReferenceTrajectoryError, foreign
 from repair.reference.base import Along, MakeReference, ReferenceSource
 from repair.registry import Registry, loaded
 from repair.timegrid import INSTANT
@@ -73,7 +73,8 @@ def positions_along(scene: Scene, config: ReferenceConfig) -> Array | None:
         If the source has none; the sentence says what is missing.
     """
     along: Along | str | None = SOURCES[config.source].along
-    return None if along is None else loaded(along)(scene, config)
+    with foreign(f"reference source {config.source!r}", ReferenceTrajectoryError):
+        return None if along is None else loaded(along)(scene, config)
 
 
 def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
@@ -89,7 +90,8 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
     ReferenceTrajectoryError
         If the source has no usable trajectory; the sentence says what is missing.
     """
-    curve = loaded(SOURCES[config.source].make)(scene, config, occupancy)
+    with foreign(f"reference source {config.source!r}", ReferenceTrajectoryError):
+        curve = loaded(SOURCES[config.source].make)(scene, config, occupancy)
     if not isinstance(curve, Curve):
         raise ReferenceTrajectoryError(
             f"reference source {config.source!r} gave {type(curve).__name__}; it has to give a curve "

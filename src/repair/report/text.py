@@ -90,6 +90,9 @@ def _ttc(content: dict[str, Any]) -> str:
     if kind == "collision" and touch is not None and same:
         behind = " from behind" if conflict.get("from_behind") else ""
         return f"{content['ttc_s']:.2f} s on the scenario's grid: {what}{behind} at {touch:.2f} s"
+    exact = content.get("exact_ttc_s")
+    if kind in ("margin", "off_road") and exact is not None and abs(exact - content["ttc_s"]) >= 0.005:
+        what += f" at {exact:.2f} s"
     contact = "; nothing is touched" if kind == "margin" else ""
     if touch is not None:
         behind = ", from behind" if conflict.get("from_behind") else ""

@@ -49,7 +49,8 @@ class SearchStatus(str, Enum):
             "no_conflict": "the reference can be followed to its end",
             "already_colliding": "the ego is in conflict at the very start",
             "none_feasible": "no tested time-to-repair has a feasible repair",
-            "budget_exhausted": "the time limit ended the search before any feasible repair was found",
+            "budget_exhausted": "the search was cut short, by its time limit or an interrupt, before any "
+            "feasible repair was found",
         }[self.value]
 
 

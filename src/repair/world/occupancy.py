@@ -72,7 +72,7 @@ def build_occupancy(
             first = float(np.flatnonzero(hidden)[0] * dt)
             notes.append(
                 f"obstacle {obstacle.id} is (partly) outside of the frame's domain from t = {first:g} s; "
-                "only the rectangle check sees it there"
+                "only the check of the true shapes sees it there"
             )
     ids = np.array([o.id for o in obstacles], dtype=np.int64)
     static = np.array([o.role in ("static", "environment") for o in obstacles], dtype=np.bool_)
