@@ -160,6 +160,8 @@ def record_rows(content: Mapping[str, Any], again: Again) -> list[CertificateRow
     """One row for the whole record, and one for the first difference in each of its keys."""
     direct = {key: again.direct[key] for key in _DIRECT if key in again.direct}
     found = list(differences({key: content.get(key, _Missing) for key in direct}, direct, _EXACT))
+    if again.other:  # another version may have said less
+        found = [one for one in found if one[1] is not _Missing]
     found += _by_the_probes(content, again.direct)
     rest: list[tuple[str, Any, Any]] = []
     if again.record is not None and not again.limited:

@@ -186,8 +186,8 @@ class Checker:
         if index is not None:
             assert self.road is not None
             at = centre[index]
-            where = self.road.departure(at.real, at.imag, float(orientation[index]))
-            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), where))
+            words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
+            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place))
         return found
 
     def _met(

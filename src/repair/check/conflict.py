@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from repair.check.checker import Checker
-from repair.check.verdict import Conflict, Reason, Verdict
+from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.curves.base import Curve
 from repair.timegrid import on_grid, steps_until
 from repair.world.advance import FINEST
@@ -32,26 +34,36 @@ def detect_conflict(
     dt = checker.scene.dt
     verdict = checker.check_reference(reference, t_end)
     contact = checker.contact(reference, t_end)
-    candidates: list[tuple[float, int, str, int | None, str, float]] = []
+    candidates: list[tuple[float, int, Violation]] = []
     boxes = checker.config.conflict == "boxes"
     if boxes:
         steps = min(steps_until(t_end, dt), checker.scene.n_steps)
         sampled = reference.sample(np.arange(steps + 1) * dt)
         entry = first_entry(occupancy, sampled)
         if entry is not None:
-            who = int(occupancy.ids[entry[1]])
             at = float(sampled.t[entry[0]])
-            candidates.append((at, 0, "margin", who, "", at))
+            candidates.append((at, 0, Violation(Reason.MARGIN, at, "", int(occupancy.ids[entry[1]]))))
     for violation in verdict.violations:
         at = on_grid(violation.time + FINEST, dt)  # a time of contact is early by no more than that
         if boxes and violation.reason is Reason.COLLISION and at < violation.time:
             at += dt  # the paper looks at steps
-        said = violation.detail if violation.obstacle_id is None else ""
-        candidates.append((at, 1, violation.reason.value, violation.obstacle_id, said, violation.time))
+        candidates.append((at, 1, violation))
     if not candidates:
         return Conflict(float("inf")), verdict
-    time, _, kind, obstacle, said, exact = min(candidates, key=lambda c: c[:2])
-    if contact is None:
-        return Conflict(time, kind, obstacle, detail=said, exact_time=exact), verdict
-    touched = contact.time, contact.obstacle_id, contact.from_behind
-    return Conflict(time, kind, obstacle, *touched, said, exact), verdict
+    time, _, first = min(candidates, key=lambda c: c[:2])
+    conflict = Conflict(
+        time,
+        first.reason.value,
+        first.obstacle_id,
+        detail=first.detail if first.obstacle_id is None else "",
+        exact_time=first.time,
+        place=first.place,
+    )
+    if contact is not None:
+        conflict = replace(
+            conflict,
+            contact_time=contact.time,
+            contact_id=contact.obstacle_id,
+            from_behind=contact.from_behind,
+        )
+    return conflict, verdict

@@ -25,12 +25,13 @@ class Reason(str, Enum):
 
 @dataclass(frozen=True)
 class Violation:
-    """One reason, when it first holds [s], the particulars in words, and the obstacle if it is one."""
+    """One reason, when it first holds [s], the particulars in words; obstacle or place [m] if it has one."""
 
     reason: Reason
     time: float
     detail: str = ""
     obstacle_id: int | None = None
+    place: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class Conflict:
     exact_time : float
         When the violation begins between the scenario's steps [s]: contact and margins in continuous time,
         early by 1 ms at most, the rest at the samples; ``time`` for boxes, which are looked at in steps.
+    place : (float, float) or None
+        Where the road is left [m].
     """
 
     time: float
@@ -87,3 +90,4 @@ class Conflict:
     from_behind: bool = False
     detail: str = ""
     exact_time: float = float("inf")
+    place: tuple[float, float] | None = None

@@ -87,6 +87,7 @@ def record_of(
             "from_behind": conflict.from_behind,
             "margin_only": margin_only(conflict),
             "detail": str(getattr(conflict, "detail", "")),
+            "place_m": _place(conflict.place),
         },
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,
@@ -158,6 +159,7 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
                 "t_s": number(v.time),
                 "detail": v.detail,
                 "obstacle_id": getattr(v, "obstacle_id", None),
+                "place_m": _place(v.place),
             }
             for v in probe.verdict.violations
         ],
@@ -174,6 +176,10 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "solve_time_s": number(solve.solve_time),
         "check_time_s": number(probe.check_time),
     }
+
+
+def _place(place: tuple[float, float] | None) -> list[float | None] | None:
+    return None if place is None else [number(value, 3) for value in place]
 
 
 def _metric(metric: MetricValue) -> dict[str, Any]:

@@ -46,6 +46,7 @@ def birdseye_figure(outcome: Outcome) -> Any:
             label = repair.label if repair.feasible else f"{repair.label.splitlines()[0]}, infeasible"
             axes.plot(repair.line.x, repair.line.y, label=label, zorder=4, **repair.style)
         _draw_vehicles(axes, outcome, window)
+        _draw_departures(axes, outcome)
         axes.set(
             xlim=window[0],
             ylim=window[1],
@@ -108,6 +109,16 @@ def _draw_vehicles(axes: Any, outcome: Outcome, window: _Window) -> None:
         axes.fill([], [], color=OBSTACLE, alpha=0.75, label=f"obstacle {opponent} (dark: {at:.3g} s)")
     if any(other.id != opponent for other in drawing.bodies):
         axes.fill([], [], color=OTHERS, alpha=0.75, label=f"other obstacles, {at:.3g} s")
+
+
+def _draw_departures(axes: Any, outcome: Outcome) -> None:
+    """Where the reference or a repair leaves the road."""
+    record = outcome.record
+    said = [record["conflict"], *(one for probe in record["probes"] for one in probe["details"])]
+    places = [one["place_m"] for one in said if one.get("place_m") is not None]
+    if places:
+        x, y = zip(*dict.fromkeys(map(tuple, places)), strict=True)
+        axes.plot(x, y, ls="", marker="x", ms=7, mew=1.8, color="#D00000", zorder=6, label="off the road")
 
 
 def _draw_motion(axes: Any, drawing: Drawing, window: _Window) -> None:

@@ -88,8 +88,8 @@ class RoadBoundary:
         inside = self.inside(self.outline(x[unsure], y[unsure], orientation[unsure]))
         return None if inside.all() else int(unsure[np.argmin(inside)])
 
-    def departure(self, x: float, y: float, orientation: float) -> str:
-        """Where a pose that leaves the road does so, and by how much, in words."""
+    def departure(self, x: float, y: float, orientation: float) -> tuple[str, tuple[float, float]]:
+        """Where a pose that leaves the road does so, and by how much: in words, and the place [m]."""
         import shapely
 
         pose = (np.array([value]) for value in (x, y, orientation))
@@ -98,12 +98,13 @@ class RoadBoundary:
         beyond = shapely.difference(body, around)
         area = float(shapely.area(beyond))
         if area <= 0.0:
-            return f"the ego touches the edge of the road at ({x:.1f}, {y:.1f})"
+            return f"the ego touches the edge of the road at ({x:.1f}, {y:.1f})", (x, y)
         corners = shapely.points(shapely.get_coordinates(beyond))
         far = float(np.max(shapely.distance(corners, around))) if not shapely.is_empty(around) else np.inf
         where = shapely.centroid(beyond)
         by = f"by {far:.2f} m, {area:.3f} m²" if np.isfinite(far) else "altogether"
-        return f"the ego leaves the road at ({where.x:.1f}, {where.y:.1f}) {by}"
+        words = f"the ego leaves the road at ({where.x:.1f}, {where.y:.1f}) {by}"
+        return words, (float(where.x), float(where.y))
 
     def inside(self, outlines: Array) -> npt.NDArray[np.bool_]:
         """Whether outlines (K, V, 2) lie properly inside of the road: exact, and safe among threads."""
