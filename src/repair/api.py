@@ -144,6 +144,7 @@ def repair(
     *,
     on_probe: Callable[[Probe], None] | None = None,
     on_found: Callable[[SearchResult], None] | None = None,
+    reference: Any = None,
     **keys: Any,
 ) -> RepairResult:
     """Find the F-TTR and the repaired trajectory of a scenario.
@@ -159,6 +160,11 @@ def repair(
     on_found : callable, optional
         Called when the search has ended, before anything is made of it: from then on an interrupt is the
         caller's.
+    reference : optional
+        What is followed, from memory, instead of what ``reference.source`` names: an array (N, 3..5) with the
+        columns ``t [s], x [m], y [m][, yaw [rad][, v [m/s]]]``, a mapping with these names, a CommonRoad
+        trajectory, a curve in the scene's frame, or an earlier result; see
+        :func:`repair.reference.given.given_reference`.
     **keys
         Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
 
@@ -181,8 +187,16 @@ def repair(
     phases = Phases()
     with phases("load"):
         scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
+    if isinstance(reference, RepairResult):
+        reference = reference.states
+    elif isinstance(reference, Outcome):
+        reference = reference.driven()
     return search(
-        prepare(scene, config), backend, on_probe=on_probe, on_found=on_found, phases=phases.seconds
+        prepare(scene, config, reference),
+        backend,
+        on_probe=on_probe,
+        on_found=on_found,
+        phases=phases.seconds,
     )
 
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from repair.check.conflict import detect_conflict
 from repair.config.schema import Config, require_types
 from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.problem.limits import resolve_limits
+from repair.reference.given import GivenReference, given_reference
 from repair.reference.recorded import known_until
 from repair.reference.registry import SOURCES, make_reference, positions_along, reference_notes
 from repair.scene.reframe import as_ego, reframe
@@ -55,14 +57,25 @@ class Prepared(Situation):
     config : Config
     phases : dict
         Wall time of the preparation by phase [s].
+    given : GivenReference or None
+        The reference that was handed over from memory.
     """
 
     config: Config
     phases: dict[str, float]
+    given: GivenReference | None = None
 
 
-def prepare(scene: Scene, config: Config) -> Prepared:
+def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     """Occupancy, reference, checker and conflict of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    config : Config
+    reference : optional
+        A reference from memory, instead of what ``reference.source`` names; see
+        :func:`repair.reference.given.given_reference`.
 
     Raises
     ------
@@ -76,7 +89,10 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     require_types(config)
     config = _agreed(scene, config)
     phases = Phases()
-    positions = positions_along(scene, config.reference)
+    given = None
+    if reference is not None:
+        config, given = _with_given(config), given_reference(reference, scene)
+    positions = positions_along(scene, config.reference) if given is None else given.positions
     if positions is not None:
         scene = reframe(scene, positions[: known_until(positions)])
         chosen = config.reference.obstacle_id
@@ -96,13 +112,13 @@ def prepare(scene: Scene, config: Config) -> Prepared:
     offsets = s_offset, l_offset
     with phases("reference"):
         known, _ = shrink_to_start(occupancy, scene.start[0], touching, offsets)
-        reference = make_reference(scene, config.reference, known)
-    t_reference = min(scene.horizon, reference.t_end)
-    followed = reference.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
-    occupancy, more = shrink_to_start(occupancy, followed, touching, offsets)
+        followed = make_reference(scene, config.reference, known) if given is None else given.curve(scene)
+    t_reference = min(scene.horizon, followed.t_end)
+    places = followed.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
+    occupancy, more = shrink_to_start(occupancy, places, touching, offsets)
     with phases("conflict"):
-        conflict, _ = detect_conflict(reference, occupancy, checker, t_reference)
-    said = reference_notes(scene, reference)
+        conflict, _ = detect_conflict(followed, occupancy, checker, t_reference)
+    said = reference_notes(scene, followed)
     wanted = config.repair.horizon
     if wanted is None:
         wanted = conflict.time + config.repair.after_conflict
@@ -118,7 +134,7 @@ def prepare(scene: Scene, config: Config) -> Prepared:
         settings=config.repair,
         limits=limits,
         occupancy=occupancy,
-        reference=reference,
+        reference=followed,
         checker=checker,
         conflict=conflict,
         t_reference=t_reference,
@@ -126,7 +142,24 @@ def prepare(scene: Scene, config: Config) -> Prepared:
         notes=(*scene.notes, *said, *notes, *more, *_remarks(config, wanted, t_reference)),
         config=config,
         phases=phases.seconds,
+        given=given,
     )
+
+
+def _with_given(config: Config) -> Config:
+    """The configuration as it is where the reference is handed over.
+
+    Raises
+    ------
+    ConfigError
+        If it names another source on purpose.
+    """
+    source = config.reference.source
+    if source != "given" and "reference.source" in config.given:
+        raise ConfigError(f"a reference is given, and reference.source={source} names another; leave one out")
+    agreed = replace(config, reference=replace(config.reference, source="given"))
+    agreed.given = config.given
+    return agreed
 
 
 def _agreed(scene: Scene, config: Config) -> Config:

@@ -156,7 +156,7 @@ def _prepare(folder: Path, content: Mapping[str, Any]) -> tuple[Path, Prepared]:
             f"{folder} is of planning problem {origin.get('planning_problem_id')}, "
             f"and by its configuration it would be {scene.planning_problem_id}"
         )
-    return path, prepare(scene, config)
+    return path, prepare(scene, config, content.get("given_reference"))
 
 
 def _record_rows(

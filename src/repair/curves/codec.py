@@ -62,8 +62,11 @@ def read_curve(content: Mapping[str, Any] | None) -> UniformBSpline | BernsteinC
     """
     if content is None:
         return None
+    kind = content.get("type")
+    if kind == "samples":
+        raise RepairError("the curve in result.json is of type 'samples'; only splines can be certified")
     try:
-        kind, start, spacing = content["type"], float(content["t_start_s"]), float(content["spacing_s"])
+        start, spacing = float(content["t_start_s"]), float(content["spacing_s"])
         points = frozen(content["control_points_m"])
         if kind == "uniform_bspline":
             return UniformBSpline(start, spacing, int(content["degree"]), points)

@@ -154,6 +154,11 @@ class Outcome:
         """How the search ended: ``found``, ``no_conflict``, ..."""
         return str(self.record["status"])
 
+    def driven(self) -> dict[str, Any]:
+        """What is driven at each step: ``t`` [s], ``x``, ``y`` [m], ``yaw`` [rad], ``v`` [m/s]."""
+        names = {"t": "t_s", "x": "x_m", "y": "y_m", "yaw": "orientation_rad", "v": "speed_mps"}
+        return {name: self.record["trajectory"][key] for name, key in names.items()}
+
     @property
     def ttc(self) -> float:
         """Time-To-Collision [s], inf without a conflict."""

@@ -95,6 +95,7 @@ def record_of(
         "probes": [_probe(prepared, p) for p in found.probes],
         "curve": curve_to_dict(found.curve),
         "reference": curve_to_dict(prepared.reference, prepared.t_reference),
+        "given_reference": None if prepared.given is None else prepared.given.plain,
         "t_end_s": number(prepared.t_end),
         "trajectory": _trajectory(prepared, found, states),
         "limits": _limits(prepared.limits),

@@ -31,6 +31,7 @@ __all__ = [
     "recorded_reference",
     "solution_positions",
     "solution_reference",
+    "states_of",
 ]
 
 
@@ -147,7 +148,7 @@ def _from_solution(scene: Scene, file: str | None) -> Recording:
             f"{path} holds no solution for planning problem {scene.planning_problem_id}"
         )
     vehicle = _vehicle_of(matching[0], scene.vehicle)
-    made = _states(matching[0].trajectory.state_list, str(path), scene.initial_time_step, vehicle)
+    made = states_of(matching[0].trajectory.state_list, str(path), scene.initial_time_step, vehicle)
     start = scene.initial_state
     require_start(made, start.x, start.y, start.orientation, start.velocity)
     require_consistent(made, scene.dt, vehicle)
@@ -162,7 +163,7 @@ def _vehicle_of(solution: Any, usual: Vehicle) -> Vehicle:
         return usual
 
 
-def _states(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Recording:
+def states_of(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Recording:
     """The states of a solution from step ``first`` on, one for each step.
 
     Raises

@@ -41,6 +41,10 @@ SOURCES: Registry[ReferenceSource] = Registry(
             "repair.reference.recorded:solution_positions",
             says="a CommonRoad solution file, reference.file",
         ),
+        "given": ReferenceSource(
+            "repair.reference.given:no_given_reference",
+            says="from memory, the argument reference= of repair.repair",
+        ),
     },
     error=ConfigError,
     group="repair.references",

@@ -1,0 +1,212 @@
+"""References from memory: what is taken, what is refused and where, and that a result is certified."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests import roads
+
+import repair
+from repair.certify.certificate import format_certificate
+from repair.certify.recompute import certify
+from repair.errors import ConfigError, ReferenceTrajectoryError
+from repair.reference.given import given_reference
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """Return a straight road with a slower car ahead."""
+    file = tmp_path_factory.mktemp("road") / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(roads.scenario(), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def scene(path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return repair.load_scene(path)
+
+
+@pytest.fixture(scope="module")
+def usual(scene):
+    return repair.repair(scene, overrides=["reference.source=constant"])
+
+
+@pytest.fixture(scope="module")
+def planned(scene):
+    """Return a reference that is a spline."""
+    return repair.repair(scene, overrides=["reference.source=planner"]).prepared.reference
+
+
+@pytest.fixture(scope="module")
+def drive(usual):
+    """Return the constant reference as it is driven, four samples to a step."""
+    return usual.prepared.checker.drive(usual.prepared.reference, usual.prepared.t_reference)
+
+
+def table(drive):
+    return np.column_stack([drive.t, drive.x, drive.y, drive.orientation, drive.speed])
+
+
+def trajectory(drive, scene):
+    """Return the same as a CommonRoad trajectory."""
+    from commonroad.scenario.state import KSState
+    from commonroad.scenario.trajectory import Trajectory
+
+    first, at = scene.initial_time_step, drive.every(4)
+    states = [
+        KSState(
+            time_step=first + k, position=np.array([at.x[k], at.y[k]]), orientation=float(at.orientation[k]),
+            velocity=float(at.speed[k]), steering_angle=float(at.steering[k]),
+        )
+        for k in range(len(at))
+    ]  # fmt: skip
+    return Trajectory(first, states)
+
+
+def uneven(drive, scene):
+    """Return samples at times that jitter; the speed is constant, so that they lie on straight lines."""
+    values = table(drive)
+    t = values[:, 0].copy()
+    t[1:-1] += 0.2 * 0.025 * np.random.default_rng(3).uniform(-1.0, 1.0, len(t) - 2)
+    return np.column_stack([t, *(np.interp(t, values[:, 0], column) for column in values.T[1:])])
+
+
+FORMS = {
+    "t, x, y": lambda d, s: table(d)[:, :3],
+    "t, x, y, yaw": lambda d, s: table(d)[:, :4],
+    "t, x, y, yaw, v": lambda d, s: table(d),
+    "a list": lambda d, s: table(d).tolist(),
+    "at other times": lambda d, s: table(d)[::3],
+    "unevenly": uneven,
+    "a mapping": lambda d, s: {"t": d.t, "x": d.x, "y": d.y, "v": d.speed},
+    "driven states": lambda d, s: d,
+    "a trajectory": trajectory,
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_gives_the_same_answer(form, drive, scene, usual):
+    found = repair.repair(scene, reference=FORMS[form](drive, scene))
+    assert found.f_ttr == usual.f_ttr
+    assert found.search.conflict.kind == usual.search.conflict.kind
+    assert found.search.conflict.time == pytest.approx(usual.search.conflict.time, abs=1e-9)
+    assert found.search.conflict.contact_time == pytest.approx(usual.search.conflict.contact_time, abs=2e-3)
+    assert found.prepared.config.reference.source == "given"
+
+
+def test_a_curve_is_taken_as_it_is(scene, planned, usual):
+    found = repair.repair(scene, reference=planned)
+    assert found.prepared.reference is planned
+    assert found.f_ttr == repair.repair(scene, overrides=["reference.source=planner"]).f_ttr
+    # One that no spline is: its result can be had, and says why it is not certified.
+    assert repair.repair(scene, reference=usual.prepared.reference).f_ttr == usual.f_ttr
+
+
+def test_an_earlier_result_is_followed(scene, usual, tmp_path):
+    """And it runs into nothing, being a repair; from a folder as well."""
+    again = repair.repair(scene, reference=usual)
+    assert again.search.conflict.contact_time == np.inf
+    usual.save(tmp_path, figure=False)
+    read = repair.repair(scene, reference=repair.load_result(tmp_path))
+    assert read.search.conflict == again.search.conflict
+
+
+def shifted(column, by, rows=slice(None)):
+    def change(values):
+        values[rows, column] += by
+        return values
+
+    return change
+
+
+WRONG = {
+    "none": (lambda v: "nothing", "cannot be read as numbers"),
+    "flat": (lambda v: v[:, 0], "of shape"),
+    "two columns": (lambda v: v[:, :2], "of shape"),
+    "three samples": (lambda v: v[:3], "at least 4"),
+    "a hole in time": (lambda v: np.delete(v, slice(20, 26), axis=0), "gap: from t = 0.475"),
+    "far apart": (lambda v: v[::28], "gap: from t = 0 to 0.7"),
+    "backwards": (lambda v: v[[0, 1, 2, 2, 4, 5]], "do not go on"),
+    "later": (lambda v: v[8:], "begins at t = 0.2"),
+    "no number": (shifted(1, np.nan, slice(12, 13)), "x of sample 12 is not finite"),
+    "elsewhere": (shifted(1, 3.0), "3 m from the ego's initial position"),
+    "turned": (shifted(3, 0.2), "rad"),
+    "faster": (shifted(4, 5.0), "m/s"),
+    "a jump": (shifted(1, 2.0, slice(40, None)), "at time step 3"),
+    "a speed of its own": (shifted(4, 30.0, slice(60, 70)), "speed"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_is_named_with_its_place(what, drive, scene):
+    change, words = WRONG[what]
+    with pytest.raises(ReferenceTrajectoryError, match="the given reference") as caught:
+        repair.repair(scene, reference=change(table(drive)))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "columns, words",
+    [
+        ({"t": [0, 1], "x": [0, 1]}, "no column y"),
+        ({"t": [0, 1], "x": [0, 1], "y": [0, 1], "speed": [1, 1]}, "'speed'"),
+        ({"t": [0, 1, 2], "x": [0, 1], "y": [0, 1, 2]}, "shape"),
+        ({"t": 0.0, "x": 0.0, "y": 0.0}, "shape"),
+    ],
+)
+def test_a_mapping_with_other_columns(columns, words, scene):
+    with pytest.raises(ReferenceTrajectoryError, match=words):
+        given_reference(columns, scene)
+
+
+def test_speeds_without_headings_are_held_against_the_positions(drive, scene):
+    columns = {"t": drive.t, "x": drive.x, "y": drive.y, "v": drive.speed.copy()}
+    columns["v"][50:60] += 4.0
+    with pytest.raises(ReferenceTrajectoryError, match=r"from t = 1\.2"):
+        given_reference(columns, scene)
+
+
+@pytest.mark.parametrize("change", [{"start": 0.5}, {"shift": (5.0, 0.0)}, {"shift": (np.nan, 0.0)}])
+def test_a_curve_that_starts_elsewhere(change, scene, planned):
+    curve = planned
+    if "start" in change:
+        curve = replace(curve, t_start=0.5)
+    else:
+        curve = replace(curve, points=curve.points + np.array(change["shift"]))
+    with pytest.raises(ReferenceTrajectoryError, match="the given reference"):
+        repair.repair(scene, reference=curve)
+
+
+def test_two_references_are_one_too_many(drive, scene):
+    with pytest.raises(ConfigError, match="leave one out"):
+        repair.repair(scene, reference=table(drive), overrides=["reference.source=constant"])
+    found = repair.repair(scene, reference=table(drive), overrides=["reference.source=given"])
+    assert found.status == "found"
+
+
+def test_given_from_the_command_line_is_a_sentence(path, capsys):
+    from repair.cli.command import main
+
+    assert main(["run", str(path), "--reference", "given"]) == 2
+    assert "the argument reference=" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["t, x, y", "at other times", "a trajectory", "a curve"])
+def test_a_result_with_a_given_reference_is_certified(form, drive, scene, planned, tmp_path):
+    thing = planned if form == "a curve" else FORMS[form](drive, scene)
+    repair.repair(scene, reference=thing, overrides=["backend=casadi"]).save(tmp_path, figure=False)
+    certificate = certify(tmp_path)
+    assert certificate.ok, format_certificate(certificate)
+
+
+def test_a_short_reference_holds_until_its_end(drive, scene):
+    found = repair.repair(scene, reference=table(drive)[:41])
+    assert found.prepared.t_reference == pytest.approx(1.0)
+    assert found.to_dict()["checked_until_s"] == pytest.approx(1.0)
+    assert any("ends at 1 s" in note for note in found.to_dict()["notes"])
