@@ -19,6 +19,7 @@ from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
 from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve, FrenetTrajectory
+from repair.curves.plane import STANDSTILL
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.timegrid import INSTANT, steps_until
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
 __all__ = ["Checker"]
-
-_STANDS = 1e-6  # below this speed [m/s] a path says nothing about the body's direction
 
 
 @dataclass(frozen=True)
@@ -168,8 +167,11 @@ class Checker:
         return path, motion[0], self._standing(path) if first == 0 else slip0
 
     def _standing(self, path: CartesianPath) -> float | None:
-        """Slip angle of a vehicle that stands at t = 0, by its orientation; None if it moves."""
-        if len(path.speed) and abs(float(path.speed[0])) < _STANDS:
+        """Slip angle of a vehicle that stands at t = 0, by its orientation; None if it moves.
+
+        Of a path that stands the direction is held, so that it says nothing about the body's.
+        """
+        if len(path.speed) and abs(float(path.speed[0])) < STANDSTILL:
             return float(wrap(path.heading[0] - self.scene.initial_state.orientation))
         return None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +16,14 @@ if TYPE_CHECKING:
 
 __all__ = ["no_solution_because", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
 
+_TURN = 2.0 * math.pi
+
 
 def to_trajectory(scene: Scene, states: DrivenStates) -> Any:
     """What is driven, as a ``commonroad.scenario.trajectory.Trajectory`` of KS states.
+
+    Orientations are counted from the planning problem's on: CommonRoad allows [-2 pi, 2 pi] there, and its
+    solution checker compares the first one as a plain number.
 
     Parameters
     ----------
@@ -28,7 +34,15 @@ def to_trajectory(scene: Scene, states: DrivenStates) -> Any:
     from commonroad.scenario.trajectory import Trajectory
 
     first = scene.initial_time_step
-    return Trajectory(initial_time_step=first, state_list=scene.model.to_commonroad(states, first))
+    driven = scene.model.to_commonroad(states, first)
+    turns = round((scene.initial_state.orientation - driven[0].orientation) / _TURN)
+    for state in driven if turns else ():
+        angle = state.orientation + turns * _TURN
+        if state is driven[0]:
+            state.orientation = min(max(angle, -_TURN), _TURN)
+        else:
+            state.orientation = angle - _TURN * (angle > _TURN) + _TURN * (angle < -_TURN)
+    return Trajectory(initial_time_step=first, state_list=driven)
 
 
 def to_dynamic_obstacle(scene: Scene, states: DrivenStates, obstacle_id: int | None = None) -> Any:
