@@ -43,8 +43,10 @@ if TYPE_CHECKING:
     from repair.problem.problem import Maneuver, RepairProblem
     from repair.reference.registry import register as register_reference
     from repair.save import register as register_format
-    from repair.scene.commonroad import load_scene, scene_from_scenario
+    from repair.scene.commonroad import load_scene, scene_from_scenario, with_traffic
     from repair.scene.scene import Scene
+    from repair.scene.traffic.given import Prediction, predictions_of
+    from repair.search.modes import ModeResult
     from repair.search.result import Probe, SearchResult, SearchStatus
     from repair.situation import Situation
     from repair.solvers.registry import available as available_backends
@@ -64,8 +66,10 @@ __all__ = [
     "Conflict",
     "FrenetTrajectory",
     "Maneuver",
+    "ModeResult",
     "Outcome",
     "OutputError",
+    "Prediction",
     "Prepared",
     "Probe",
     "Reason",
@@ -89,6 +93,7 @@ __all__ = [
     "load_config",
     "load_result",
     "load_scene",
+    "predictions_of",
     "prepare",
     "preset_names",
     "register_backend",
@@ -99,6 +104,7 @@ __all__ = [
     "register_vehicle",
     "repair",
     "scene_from_scenario",
+    "with_traffic",
 ]
 
 _NAMES: dict[str, tuple[str, ...]] = {
@@ -118,8 +124,10 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.preparation": ("Prepared", "prepare"),
     "repair.io.result_json": ("load_result",),
     "repair.problem.problem": ("Maneuver", "RepairProblem"),
-    "repair.scene.commonroad": ("load_scene", "scene_from_scenario"),
+    "repair.search.modes": ("ModeResult",),
+    "repair.scene.commonroad": ("load_scene", "scene_from_scenario", "with_traffic"),
     "repair.scene.scene": ("Scene",),
+    "repair.scene.traffic.given": ("Prediction", "predictions_of"),
     "repair.search.result": ("Probe", "SearchResult", "SearchStatus"),
     "repair.situation": ("Situation",),
     "repair.solvers.registry": ("backend_names",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,10 +25,11 @@ from repair.metrics.registry import measure
 from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
 from repair.outcome.record import driven_curve
-from repair.preparation import Phases, Prepared, prepare
+from repair.preparation import Phases, Prepared, among, prepare
 from repair.save import Saved, saved
-from repair.scene.commonroad import load_scene
+from repair.scene.commonroad import load_scene, with_traffic
 from repair.scene.scene import Scene
+from repair.search.modes import ModeResult, each_mode
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
 from repair.solvers.registry import make_backend
@@ -59,6 +60,8 @@ class RepairResult:
     metrics : dict
         The metrics that were asked for (``metrics: [ttr, ...]``), by name; with ``driver: at_ttr`` also
         the TTR.
+    modes : tuple of ModeResult
+        What each mode alone would allow, of obstacles that were given several predictions.
     capabilities : Capabilities
         Of the backend.
     """
@@ -70,6 +73,7 @@ class RepairResult:
     phases: dict[str, float]
     metrics: dict[str, MetricValue] = field(default_factory=dict)
     capabilities: Capabilities = field(default_factory=Capabilities)
+    modes: tuple[ModeResult, ...] = ()
 
     @property
     def status(self) -> SearchStatus:
@@ -105,8 +109,9 @@ class RepairResult:
     def outcome(self) -> Outcome:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
-            self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities
-        )
+            self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
+            self.modes,
+        )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
         """The ego as a ``commonroad.scenario.obstacle.DynamicObstacle``, to add to a scenario."""
@@ -145,6 +150,7 @@ def repair(
     on_probe: Callable[[Probe], None] | None = None,
     on_found: Callable[[SearchResult], None] | None = None,
     reference: Any = None,
+    traffic: Iterable[Any] | None = None,
     **keys: Any,
 ) -> RepairResult:
     """Find the F-TTR and the repaired trajectory of a scenario.
@@ -165,6 +171,9 @@ def repair(
         columns ``t [s], x [m], y [m][, yaw [rad][, v [m/s]]]``, a mapping with these names, a CommonRoad
         trajectory, a curve in the scene's frame, or an earlier result; see
         :func:`repair.reference.given.given_reference`.
+    traffic : iterable, optional
+        All other traffic there is, from memory, instead of the scenario's: CommonRoad obstacles and
+        :class:`repair.Prediction`; see :func:`repair.with_traffic`.
     **keys
         Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
 
@@ -187,6 +196,9 @@ def repair(
     phases = Phases()
     with phases("load"):
         scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
+    if traffic is not None:
+        with phases("load"):
+            scene = with_traffic(scene, traffic)
     if isinstance(reference, RepairResult):
         reference = reference.states
     elif isinstance(reference, Outcome):
@@ -243,7 +255,14 @@ def search(
         curve, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
         reached = prepared.checker.peaks(curve, t_end, t_rep)
     states = prepared.checker.drive(curve, t_end).every(config.checker.substeps)
-    return RepairResult(prepared, found, states, reached, timed.seconds, metrics, backend.capabilities)
+    modes: tuple[ModeResult, ...] = ()
+    if prepared.scene.modes:
+        with timed("modes"):
+            modes = each_mode(
+                prepared.scene.modes, prepared.scene.obstacles, found,
+                lambda traffic: find(among(prepared, traffic), backend),
+            )  # fmt: skip
+    return RepairResult(prepared, found, states, reached, timed.seconds, metrics, backend.capabilities, modes)
 
 
 def find(

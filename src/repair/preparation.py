@@ -13,6 +13,7 @@ import numpy as np
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
 from repair.config.schema import Config, require_types
+from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.problem.limits import resolve_limits
 from repair.reference.given import GivenReference, given_reference
@@ -21,11 +22,12 @@ from repair.reference.registry import SOURCES, make_reference, positions_along, 
 from repair.scene.reframe import as_ego, reframe
 from repair.scene.scene import Scene
 from repair.scene.settings import LOADING, SceneConfig
+from repair.scene.traffic.obstacle import Obstacle
 from repair.situation import Situation
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.world.occupancy import build_occupancy, shrink_to_start
 
-__all__ = ["Phases", "Prepared", "prepare"]
+__all__ = ["Phases", "Prepared", "among", "prepare"]
 
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
@@ -98,6 +100,19 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
         chosen = config.reference.obstacle_id
         if chosen is not None and SOURCES[config.reference.source].becomes_ego:
             scene = as_ego(scene, chosen)
+    return _laid_out(scene, config, given, phases, None)
+
+
+def among(prepared: Prepared, obstacles: tuple[Obstacle, ...]) -> Prepared:
+    """The same road, ego and reference among other traffic."""
+    scene = replace(prepared.scene, obstacles=obstacles)
+    return _laid_out(scene, prepared.config, prepared.given, Phases(), prepared.reference)
+
+
+def _laid_out(
+    scene: Scene, config: Config, given: GivenReference | None, phases: Phases, reference: Curve | None
+) -> Prepared:
+    """What is searched, with a reference that there is already or with that of the configuration."""
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
     room = config.checker.clearance + _BODY_MARGIN
@@ -112,7 +127,12 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     offsets = s_offset, l_offset
     with phases("reference"):
         known, _ = shrink_to_start(occupancy, scene.start[0], touching, offsets)
-        followed = make_reference(scene, config.reference, known) if given is None else given.curve(scene)
+        if reference is not None:
+            followed = reference
+        elif given is not None:
+            followed = given.curve(scene)
+        else:
+            followed = make_reference(scene, config.reference, known)
     t_reference = min(scene.horizon, followed.t_end)
     places = followed.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
     occupancy, more = shrink_to_start(occupancy, places, touching, offsets)

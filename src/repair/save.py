@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from repair.errors import OutputError, foreign
-from repair.io.commonroad import no_solution_because, to_solution
+from repair.io.commonroad import no_solution_because, scenario_bytes, to_solution
 from repair.io.files import write_files
 from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_json
 from repair.outcome.data import Outcome
@@ -105,11 +106,20 @@ def figure_files(result: Saved) -> Files:
 
 
 def scenario_file(result: Saved) -> Files:
-    """The scenario, if it is a reconstruction: nobody else has it."""
-    path = result.scene.path
-    if result.outcome.record["provenance"]["kind"] != "reconstruction" or path is None or not path.is_file():
+    """The scenario, if it is a reconstruction or from memory: nobody else has it."""
+    path, kind = result.scene.path, result.outcome.record["provenance"]["kind"]
+    if kind == "reconstruction" and path is not None and path.is_file():
+        return Files({path.name: path.read_bytes()}, {"scenario_file": path.name})
+    if kind != "memory":
         return Files({}, {"scenario_file": None})
-    return Files({path.name: path.read_bytes()}, {"scenario_file": path.name})
+    name = f"{result.name}.xml"
+    try:
+        content = scenario_bytes(result.scene)
+    except OutputError as error:
+        return Files({}, {"scenario_file": None, "scenario_file_problem": str(error)}, (name,))
+    return Files(
+        {name: content}, {"scenario_file": name, "scenario_sha256": hashlib.sha256(content).hexdigest()}
+    )
 
 
 FORMATS: Registry[Format] = Registry(

@@ -144,7 +144,7 @@ def _prepare(folder: Path, content: Mapping[str, Any]) -> tuple[Path, Prepared]:
     path = folder / beside if beside else Path(str(origin.get("path") or ""))
     if not path.is_file():
         raise RepairError(f"the scenario {path} of the result is not there any more")
-    wanted = origin.get("sha256")
+    wanted = origin.get("sha256") or content.get("scenario_sha256")
     if not wanted:
         raise RepairError(f"{folder} does not say by its checksum which scenario it was made from")
     if hashlib.sha256(path.read_bytes()).hexdigest() != wanted:

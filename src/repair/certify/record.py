@@ -19,7 +19,8 @@ __all__ = ["Again", "differences", "record_rows", "searched_again"]
 
 #: What a run is free to differ in: times of the clock, versions, names of files, iterations.
 _FREE = frozenset(
-    {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "drawing_file", "provenance",
+    {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
+     "scenario_file_problem", "modes", "drawing_file", "provenance",
      "config", "build_time_s", "solve_time_s", "check_time_s", "iterations"}
 )  # fmt: skip
 #: What follows from the scenario, the configuration and the curve alone.
@@ -160,6 +161,10 @@ def record_rows(content: Mapping[str, Any], again: Again) -> list[CertificateRow
     """One row for the whole record, and one for the first difference in each of its keys."""
     direct = {key: again.direct[key] for key in _DIRECT if key in again.direct}
     found = list(differences({key: content.get(key, _Missing) for key in direct}, direct, _EXACT))
+    if (content.get("provenance") or {}).get("kind") == "memory":  # only there is said who stands for whom
+        found = [one for one in found if not one[0].startswith("notes")]
+        gone = [note for note in direct.get("notes", ()) if note not in (content.get("notes") or ())]
+        found += [("notes", _Missing, note) for note in gone]
     if again.other:  # another version may have said less
         found = [one for one in found if one[1] is not _Missing]
     found += _by_the_probes(content, again.direct)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import tempfile
+import warnings
 from numbers import Integral
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from repair.errors import OutputError, in_words
+from repair.errors import OutputError, foreign, in_words
 from repair.search.result import SearchStatus
 from repair.vehicle.parameters import VEHICLE_NAMES
 
@@ -14,7 +17,9 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
     from repair.vehicle.states import DrivenStates
 
-__all__ = ["no_solution_because", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
+__all__ = ["no_solution_because", "scenario_bytes", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
+
+_DIGITS = 12  # of what is written of a scenario from memory
 
 _TURN = 2.0 * math.pi
 
@@ -124,3 +129,27 @@ def to_solution(scene: Scene, states: DrivenStates, status: SearchStatus) -> Any
     )
     # Without a date and a computation time the same input gives the same file.
     return Solution(scene.scenario.scenario_id, [problem], date=None)
+
+
+def scenario_bytes(scene: Scene) -> bytes:
+    """The scenario and planning problem of a scene as CommonRoad XML.
+
+    Raises
+    ------
+    OutputError
+        If commonroad-io cannot write it.
+    """
+    from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
+    from commonroad.planning.planning_problem import PlanningProblemSet
+
+    with (
+        foreign("writing the scenario", OutputError),
+        warnings.catch_warnings(),
+        tempfile.TemporaryDirectory(prefix="repair-") as aside,
+    ):
+        warnings.simplefilter("ignore")
+        file = Path(aside) / "scenario.xml"
+        problems = PlanningProblemSet([scene.planning_problem])
+        writer = CommonRoadFileWriter(scene.scenario, problems, decimal_precision=_DIGITS)
+        writer.write_to_file(str(file), OverwriteExistingFile.ALWAYS)
+        return file.read_bytes()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from repair.backend.base import Capabilities
 from repair.check.peaks import Peaks
@@ -11,6 +11,7 @@ from repair.outcome.data import Outcome
 from repair.outcome.draw import drawing_of
 from repair.outcome.record import record_of
 from repair.preparation import Prepared
+from repair.search.modes import ModeResult
 from repair.search.result import SearchResult
 from repair.vehicle.states import DrivenStates
 
@@ -25,7 +26,8 @@ def outcome_of(
     phases: Mapping[str, float],
     metrics: Mapping[str, MetricValue],
     capabilities: Capabilities,
+    modes: Sequence[ModeResult] = (),
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
-    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities)
+    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes)
     return Outcome(record, drawing_of(prepared, found, states))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -21,6 +21,7 @@ from repair.outcome.sentence import checked_until, checks_off, margin_only, one_
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
+from repair.search.modes import ModeResult
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.vehicle.states import DrivenStates
 
@@ -40,6 +41,7 @@ def record_of(
     phases: Mapping[str, float],
     metrics: Mapping[str, MetricValue],
     capabilities: Capabilities,
+    modes: Sequence[ModeResult] = (),
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -57,6 +59,8 @@ def record_of(
         Those that were asked for.
     capabilities : Capabilities
         Of the backend.
+    modes : sequence of ModeResult
+        What each of several predictions of an obstacle alone would allow.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -90,6 +94,7 @@ def record_of(
             "place_m": _place(conflict.place),
         },
         "metrics": {name: _metric(value) for name, value in metrics.items()},
+        "modes": [_mode(mode) for mode in modes],
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,
         **peaks_to_dict(peaks),
         "probes": [_probe(prepared, p) for p in found.probes],
@@ -176,6 +181,18 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "build_time_s": number(solve.build_time),
         "solve_time_s": number(solve.solve_time),
         "check_time_s": number(probe.check_time),
+    }
+
+
+def _mode(mode: ModeResult) -> dict[str, Any]:
+    return {
+        "obstacle_id": mode.obstacle_id,
+        "mode": mode.name,
+        "probability": number(mode.probability),
+        "stands_as": mode.stands_as,
+        "status": mode.status,
+        "ttc_s": number(mode.ttc),
+        "f_ttr_s": number(mode.f_ttr),
     }
 
 

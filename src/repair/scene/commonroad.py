@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,12 +24,13 @@ from repair.scene.scene import Scene
 from repair.scene.settings import SceneConfig
 from repair.scene.speed_signs import speed_limit_along
 from repair.scene.start import first_step_of, initial_state_of, is_ego
+from repair.scene.traffic.given import given_scenario
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.settings import keys_of, require_type
 from repair.timegrid import steps_until
 from repair.vehicle.model import vehicle_model
 
-__all__ = ["load_scene", "scene_from_scenario"]
+__all__ = ["load_scene", "scene_from_scenario", "with_traffic"]
 
 _HORIZON_MAX = 10.0  # unless the caller wants another [s]
 _HORIZON_DEFAULT = 5.0  # where neither a prediction nor a goal time says how long [s]
@@ -146,6 +147,37 @@ def scene_from_scenario(
     settings = _settings(config, asked)
     _require_objects(scenario, planning_problem)
     return _quiet(scenario, planning_problem, settings)
+
+
+def with_traffic(scene: Scene, traffic: Iterable[Any], *, threshold: float = 0.0) -> Scene:
+    """The same scene among other traffic, from memory.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its own traffic is left out.
+    traffic : iterable
+        CommonRoad obstacles, or :class:`repair.Prediction`: poses or occupancies over the scenario's steps.
+        Several predictions with one id are modes of that obstacle: a repair has to be clear of all of them.
+        :func:`repair.predictions_of` makes predictions of arrays.
+    threshold : float
+        Modes less probable than this are left out, with a note.
+
+    Returns
+    -------
+    Scene
+        Its ``modes`` say which prediction stands under which id. The horizon is that of the predictions.
+
+    Raises
+    ------
+    ScenarioError
+        If an obstacle cannot be had; the sentence names it.
+    """
+    if not isinstance(scene, Scene):
+        raise ScenarioError(f"a scene is expected (repair.load_scene), not {kind_of(scene)}")
+    scenario, modes, notes = given_scenario(scene.scenario, scene.initial_time_step, traffic, threshold)
+    made = _quiet(scenario, scene.planning_problem, scene.settings)
+    return replace(made, id=scene.id, modes=modes, notes=(*made.notes, *notes))
 
 
 def _require_objects(scenario: Any, problem: Any) -> None:

@@ -14,6 +14,7 @@ from repair.arrays import Array
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
 from repair.scene.settings import SceneConfig
+from repair.scene.traffic.given import Mode
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.stepwise import expand_intervals
 from repair.vehicle.model import VehicleModel
@@ -93,6 +94,8 @@ class Scene:
         looked at by nobody, and what CommonRoad's own checker is to judge comes from :meth:`official`.
     settings : SceneConfig
         What the scene was loaded with.
+    modes : tuple of Mode
+        Of obstacles that were given several predictions (:func:`repair.with_traffic`).
     """
 
     id: str
@@ -120,6 +123,7 @@ class Scene:
     scenario: Any
     planning_problem: Any
     settings: SceneConfig = field(default_factory=SceneConfig)
+    modes: tuple[Mode, ...] = ()
 
     @property
     def vehicle(self) -> Vehicle:

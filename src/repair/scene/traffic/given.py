@@ -1,0 +1,328 @@
+"""Traffic from memory: CommonRoad obstacles, or predictions as arrays, several for one obstacle if need be.
+
+Predictions become CommonRoad obstacles, so that they are read, judged and written like those of a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.errors import ScenarioError, foreign, in_words, kind_of
+
+__all__ = ["Mode", "Prediction", "given_scenario", "predictions_of"]
+
+_WHAT = "the given traffic"
+_FAR = 1_000_000  # ids of further modes begin here
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Where an obstacle will be, as one mode of a prediction has it.
+
+    Attributes
+    ----------
+    id : int
+        Positive. Several predictions with one id are modes of that obstacle.
+    poses : (T, 3) array or None
+        ``x, y`` [m] and ``yaw`` [rad] of the obstacle's centre at the scenario's steps from the planning
+        problem's start on; rows of NaN at the beginning or the end where it is not there.
+    length, width : float
+        Of its rectangle [m].
+    occupancies : sequence of (V, 2) array, or None
+        Instead of poses: the set in which it is from step to step, a polygon [m] for each.
+    kind : str
+        CommonRoad obstacle type, such as ``car``.
+    probability : float
+        Of this mode.
+    mode : str
+        Its name.
+    """
+
+    id: int
+    poses: Any = None
+    length: float | None = None
+    width: float | None = None
+    occupancies: Sequence[Any] | None = None
+    kind: str = "car"
+    probability: float = 1.0
+    mode: str = ""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One of several predictions of an obstacle, and the id under which it is among the traffic."""
+
+    obstacle_id: int
+    name: str
+    probability: float
+    stands_as: int
+
+
+def predictions_of(
+    boxes: Any, *, length: Any = None, width: Any = None, ids: Sequence[int] | None = None, kind: str = "car"
+) -> list[Prediction]:
+    """Predictions of many obstacles from one array.
+
+    Parameters
+    ----------
+    boxes : (N, T, 3) or (N, T, 5) array
+        ``x, y, yaw`` of the centres at the scenario's steps, and with five columns ``length, width`` too
+        (constant over time); NaN where an obstacle is not there.
+    length, width : float or (N,) array
+        [m], where the array has three columns.
+    ids : sequence of int, optional
+        1, 2, ... by default.
+    kind : str
+        CommonRoad obstacle type.
+
+    Raises
+    ------
+    ScenarioError
+        If the shapes do not fit.
+    """
+    with foreign(_WHAT, ScenarioError):
+        table = np.asarray(boxes, dtype=np.float64)
+    if table.ndim != 3 or table.shape[2] not in (3, 5):
+        raise ScenarioError(f"{_WHAT} is of shape {table.shape}; boxes are (N, T, 3) or (N, T, 5)")
+    count = len(table)
+    names = list(range(1, count + 1)) if ids is None else [int(i) for i in ids]
+    if len(names) != count:
+        raise ScenarioError(f"{_WHAT} has {count} obstacles and {len(names)} ids")
+    if table.shape[2] == 5:
+        if length is not None or width is not None:
+            raise ScenarioError(f"{_WHAT} holds its sizes; leave length and width out")
+        sizes = table[:, :, 3:]
+        if count and float(np.nanmax(np.nanmax(sizes, axis=1) - np.nanmin(sizes, axis=1))) > 1e-9:
+            raise ScenarioError(
+                f"{_WHAT}: the size of an obstacle changes over time; give occupancies instead"
+            )
+        size = np.nanmax(sizes, axis=1) if count else np.zeros((0, 2))
+    else:
+        if length is None or width is None:
+            raise ScenarioError(f"{_WHAT} is of shape {table.shape}; it takes length and width as well")
+        try:
+            size = np.stack(
+                [np.broadcast_to(np.asarray(v, dtype=np.float64), count) for v in (length, width)], 1
+            )
+        except ValueError as error:
+            raise ScenarioError(f"{_WHAT}: length and width do not fit {count} obstacles") from error
+    return [
+        Prediction(name, rows[:, :3], float(a), float(b), kind=kind)
+        for name, rows, (a, b) in zip(names, table, size, strict=True)
+    ]
+
+
+def given_scenario(
+    old: Any, first_step: int, traffic: Iterable[Any], threshold: float
+) -> tuple[Any, tuple[Mode, ...], list[str]]:
+    """A CommonRoad scenario with the road of a scene and this traffic.
+
+    Parameters
+    ----------
+    old : commonroad.scenario.scenario.Scenario
+        Its road and time step are kept.
+    first_step : int
+        The planning problem's.
+    traffic : iterable
+        CommonRoad obstacles and :class:`Prediction`; all there is.
+    threshold : float
+        Modes less probable than this are left out.
+
+    Returns
+    -------
+    scenario : commonroad.scenario.scenario.Scenario
+        Its road is that of the scene itself, not a copy.
+    modes : tuple of Mode
+        Of the obstacles that have several.
+    notes : list of str
+        Which modes were left out, and under which id the others stand.
+
+    Raises
+    ------
+    ScenarioError
+        If an obstacle cannot be had; the sentence names it.
+    """
+    from commonroad.scenario.scenario import Scenario
+
+    if isinstance(traffic, str | bytes) or not hasattr(traffic, "__iter__"):
+        raise ScenarioError(f"{_WHAT} has to be a list of obstacles or predictions, not {kind_of(traffic)}")
+    if not 0.0 <= threshold < 1.0:
+        raise ScenarioError(f"the threshold of modes is {threshold!r}; it has to be from 0 to below 1")
+    made = Scenario(
+        old.dt, old.scenario_id, author=old.author or "", tags=old.tags or set(),
+        affiliation=old.affiliation or "", source="", location=old.location,
+    )  # fmt: skip
+    made.replace_lanelet_network(old.lanelet_network)
+    things = list(traffic)
+    roads = _ids_of(old.lanelet_network)
+    chosen, modes, notes = _modes([p for p in things if isinstance(p, Prediction)], threshold, roads)
+    for name, prediction in chosen:
+        _add(made, _obstacle(prediction, name, first_step, float(old.dt)), name)
+    for thing in (t for t in things if not isinstance(t, Prediction)):
+        if not hasattr(thing, "obstacle_id"):
+            raise ScenarioError(f"{_WHAT} holds {kind_of(thing)}; obstacles or predictions are expected")
+        _add(made, thing, int(thing.obstacle_id))
+    return made, modes, notes
+
+
+def _ids_of(network: Any) -> set[int]:
+    """Ids that the road has taken: they are unique in CommonRoad."""
+    found = {lanelet.lanelet_id for lanelet in network.lanelets}
+    found |= {sign.traffic_sign_id for sign in network.traffic_signs}
+    found |= {light.traffic_light_id for light in network.traffic_lights}
+    for intersection in network.intersections:
+        found |= {intersection.intersection_id, *(part.incoming_id for part in intersection.incomings)}
+    return found
+
+
+def _modes(
+    predictions: list[Prediction], threshold: float, roads: set[int]
+) -> tuple[list[tuple[int, Prediction]], tuple[Mode, ...], list[str]]:
+    """Who is looked at, and under which id."""
+    notes: list[str] = []
+    for p in predictions:
+        if not isinstance(p.id, Integral) or isinstance(p.id, bool) or p.id < 1:
+            raise ScenarioError(f"{_WHAT}: an obstacle's id is a positive whole number, not {in_words(p.id)}")
+    following = max([_FAR, *roads, *(int(p.id) for p in predictions)]) + 1
+    chosen: list[tuple[int, Prediction]] = []
+    modes: list[Mode] = []
+    for name in dict.fromkeys(p.id for p in predictions):
+        own = [p for p in predictions if p.id == name]
+        kept = [p for p in own if p.probability >= threshold]
+        if len(kept) < len(own):
+            gone = ", ".join(f"{p.mode or 'unnamed'} ({p.probability:g})" for p in own if p not in kept)
+            notes.append(f"obstacle {name}: modes below the threshold of {threshold:g} are left out: {gone}")
+        for k, prediction in enumerate(kept):
+            free = k == 0 and name not in roads
+            stands_as = int(name) if free else following
+            following += not free
+            chosen.append((stands_as, prediction))
+            word = prediction.mode or f"mode {k + 1}"
+            if len(own) > 1:
+                modes.append(Mode(int(name), word, prediction.probability, stands_as))
+            if not free:
+                which = f", {word}," if len(own) > 1 else ": the road has that id; it"
+                notes.append(f"obstacle {name}{which} stands as obstacle {stands_as}")
+    return chosen, tuple(modes), notes
+
+
+def _add(scenario: Any, obstacle: Any, name: int) -> None:
+    with foreign(f"obstacle {name} of {_WHAT}", ScenarioError):
+        scenario.add_objects(obstacle)
+
+
+def _obstacle(prediction: Prediction, name: int, first: int, dt: float) -> Any:
+    """A prediction as a CommonRoad obstacle."""
+    what = f"prediction of obstacle {prediction.id}"
+    if prediction.mode:
+        what += f", {prediction.mode}"
+    if (prediction.poses is None) == (prediction.occupancies is None):
+        raise ScenarioError(f"{what}: either poses or occupancies are given")
+    if not 0.0 <= prediction.probability <= 1.0:
+        raise ScenarioError(f"{what}: its probability is {prediction.probability!r}")
+    with foreign(what, ScenarioError):
+        if prediction.poses is None:
+            return _set_based(prediction, name, first, what)
+        return _moving(prediction, name, first, dt, what)
+
+
+def _type(kind: str, what: str) -> Any:
+    from commonroad.scenario.obstacle import ObstacleType
+
+    try:
+        return ObstacleType(kind)
+    except ValueError as error:
+        known = ", ".join(sorted(member.value for member in ObstacleType))
+        raise ScenarioError(f"{what}: there is no kind {in_words(kind)}; there are {known}") from error
+
+
+def _rows(poses: Any, what: str) -> tuple[int, Array]:
+    """The first row that is there, and all from there on to the last (K, 3)."""
+    table = np.asarray(poses, dtype=np.float64)
+    if table.ndim != 2 or table.shape[1] != 3 or not len(table):
+        raise ScenarioError(
+            f"{what}: its poses are of shape {table.shape}; (T, 3) with x, y, yaw is expected"
+        )
+    there = np.asarray(np.isfinite(table).all(axis=1))
+    if not there.any():
+        raise ScenarioError(f"{what}: no pose of it is finite")
+    begin, end = int(np.argmax(there)), len(table) - int(np.argmax(there[::-1]))
+    if not there[begin:end].all():
+        hole = begin + int(np.argmin(there[begin:end]))
+        raise ScenarioError(
+            f"{what} has a hole: at step {hole} its pose is not finite, and later it is again"
+        )
+    return begin, table[begin:end]
+
+
+def _moving(prediction: Prediction, name: int, first: int, dt: float, what: str) -> Any:
+    from commonroad.geometry.shape import Rectangle
+    from commonroad.prediction.prediction import TrajectoryPrediction
+    from commonroad.scenario.obstacle import DynamicObstacle
+    from commonroad.scenario.state import CustomState, InitialState
+    from commonroad.scenario.trajectory import Trajectory
+
+    length, width = prediction.length, prediction.width
+    if not all(v is not None and np.isfinite(v) and v > 0.0 for v in (length, width)):
+        raise ScenarioError(
+            f"{what}: length and width are {length!r} and {width!r}; both have to be positive"
+        )
+    begin, rows = _rows(prediction.poses, what)
+    rows[:, 2] = np.arctan2(np.sin(rows[:, 2]), np.cos(rows[:, 2]))
+    shape = Rectangle(float(length or 0.0), float(width or 0.0))
+    speed = _speeds(rows, dt)
+    start = InitialState(
+        time_step=first + begin, position=rows[0, :2], orientation=float(rows[0, 2]),
+        velocity=float(speed[0]), acceleration=0.0, yaw_rate=0.0, slip_angle=0.0,
+    )  # fmt: skip
+    states = [
+        CustomState(
+            time_step=first + begin + k,
+            position=rows[k, :2],
+            orientation=float(rows[k, 2]),
+            velocity=float(speed[k]),
+        )
+        for k in range(1, len(rows))
+    ]
+    trajectory = Trajectory(first + begin + 1, states) if states else None
+    known = TrajectoryPrediction(trajectory, shape) if trajectory is not None else None
+    return DynamicObstacle(name, _type(prediction.kind, what), shape, start, known)
+
+
+def _speeds(rows: Array, dt: float) -> Array:
+    """Speeds along the headings (K,) [m/s], by central differences."""
+    if len(rows) < 2:
+        return np.zeros(len(rows))
+    moved = np.gradient(rows[:, :2], dt, axis=0)
+    return np.asarray(moved[:, 0] * np.cos(rows[:, 2]) + moved[:, 1] * np.sin(rows[:, 2]))
+
+
+def _set_based(prediction: Prediction, name: int, first: int, what: str) -> Any:
+    from commonroad.geometry.shape import Polygon
+    from commonroad.prediction.prediction import Occupancy, SetBasedPrediction
+    from commonroad.scenario.obstacle import DynamicObstacle
+    from commonroad.scenario.state import InitialState
+
+    outlines = [np.asarray(outline, dtype=np.float64) for outline in prediction.occupancies or ()]
+    for k, outline in enumerate(outlines):
+        if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3 or not np.isfinite(outline).all():
+            raise ScenarioError(
+                f"{what}: its occupancy at step {k} is no polygon (V, 2) of three corners or more"
+            )
+    if len(outlines) < 2:
+        raise ScenarioError(f"{what}: it has {len(outlines)} occupancies; one for each step is expected")
+    centre = outlines[0].mean(axis=0)
+    start = InitialState(
+        time_step=first, position=centre, orientation=0.0, velocity=0.0, acceleration=0.0, yaw_rate=0.0,
+        slip_angle=0.0,
+    )  # fmt: skip
+    sets = [Occupancy(first + k, Polygon(outline)) for k, outline in enumerate(outlines) if k]
+    shape = Polygon(outlines[0] - centre)
+    known = SetBasedPrediction(first + 1, sets)
+    return DynamicObstacle(name, _type(prediction.kind, what), shape, start, known)
