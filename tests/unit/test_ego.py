@@ -15,7 +15,7 @@ from tests import toy
 from repair.arrays import frozen
 from repair.backend.base import SolveResult, SolveStatus
 from repair.curves.base import FrenetTrajectory
-from repair.curves.bases import n_points_for
+from repair.curves.bases import fitted_knots
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.problem.problem import Maneuver, Passing, Side
@@ -79,7 +79,7 @@ def run(problem, config=PLAIN, *, spacing=0.4, sizes=SIZES):
         return made[-1][1]
 
     result = EgoBackend(config, spacing=spacing, minimise=spy, sizes=sizes).solve(problem)
-    n = n_points_for(problem.t_end - problem.t_rep, spacing, 3)
+    n, spacing = fitted_knots(problem.t_end - problem.t_rep, spacing, 3)
     initial = fit_to_curve(problem.reference, problem.t_rep, n, 3, spacing).points
     costs, minima = zip(*made, strict=True)
     return Run(*costs, *(Minimum(whole(points, initial), *rest) for points, *rest in minima), result)
@@ -202,7 +202,7 @@ def test_costs_are_the_literal_ones(side, lateral, t_end, spacing):
 
 
 def check_costs(problem, config, spacing, made):
-    n = n_points_for(problem.t_end - problem.t_rep, spacing, 3)
+    n, spacing = fitted_knots(problem.t_end - problem.t_rep, spacing, 3)
     axes = [0, 1] if problem.lateral else [0]
     bounds = literal.bounds_of(problem, config)
     initial = fit_to_curve(problem.reference, problem.t_rep, n, 3, spacing)
@@ -249,7 +249,7 @@ def check_costs(problem, config, spacing, made):
 def test_pairs_are_the_literal_ones(side):
     boxes = (*BOXES, toy.box((5.0, 60.0), (-1.0, 1.0), present=(1.0, 2.0)))  # appears and disappears
     problem = make_problem(side, boxes=boxes, t_rep=0.3)
-    n = n_points_for(3.7, 0.4, 3)
+    n = 13
     shape = fit_to_curve(problem.reference, 0.3, n, 3, 0.4)
     pairs = anchor_pairs(problem, shape.greville, shape.points, 3)
     mine = {

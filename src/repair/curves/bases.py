@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, frozen
+from repair.timegrid import ROUNDING
 
 __all__ = [
     "basis_matrix",
     "bernstein_matrix",
     "derivative_matrix",
+    "fitted_knots",
     "local_basis",
     "n_points_for",
     "segment_matrix",
@@ -69,6 +71,19 @@ def derivative_matrix(n: int, order: int, spacing: float) -> Array:
 def n_points_for(duration: float, spacing: float, degree: int) -> int:
     """Number of control points whose span covers ``duration`` (at least one segment)."""
     return max(1, ceil(duration / spacing - 1e-9)) + degree
+
+
+def fitted_knots(duration: float, spacing: float, degree: int) -> tuple[int, float]:
+    """Number of control points, and the knot spacing [s] of at most ``spacing``, whose span is ``duration``.
+
+    What is not a whole number of spacings is cut into shorter ones, all alike, so that no control point acts
+    farther beyond the end than those of any spline do.
+    """
+    segments = n_points_for(duration, spacing, 0)
+    if not duration > 0.0 or abs(segments * spacing - duration) <= ROUNDING * segments:
+        return segments + degree, spacing
+    # Rounded, so that repairs of the same duration share what has been built for it.
+    return segments + degree, round(duration / segments, 12)
 
 
 def basis_matrix(tau: npt.ArrayLike, n: int, degree: int, spacing: float, order: int = 0) -> Array:

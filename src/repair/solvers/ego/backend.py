@@ -16,7 +16,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
-from repair.curves.bases import n_points_for
+from repair.curves.bases import fitted_knots
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime
@@ -51,7 +51,7 @@ class EgoBackend:
     degree : int
         Degree of the B-spline.
     spacing : float
-        Knot spacing [s].
+        Largest knot spacing [s]: the knots are fitted to the duration of the repair.
     minimise : Minimiser, optional
         How the stages' costs are minimised; as ``config.solver`` says where it is not given.
     sizes : Sizes
@@ -73,7 +73,7 @@ class EgoBackend:
         self.config = config or EgoConfig()
         self.degree = degree
         self.spacing = spacing
-        self.stages = Stages(self.config, degree, spacing, minimise, sizes)
+        self.stages = Stages(self.config, degree, minimise, sizes)
 
     def solve(
         self,
@@ -91,12 +91,12 @@ class EgoBackend:
         """
         begin = time.perf_counter()
         deadline = begin + time_limit if time_limit is not None else None
-        n = n_points_for(problem.t_end - problem.t_rep, self.spacing, self.degree)
-        initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, self.spacing)
+        n, spacing = fitted_knots(problem.t_end - problem.t_rep, self.spacing, self.degree)
+        initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, spacing)
         built = time.perf_counter()
         try:
             deformed, pairs, cap, rounds = self.stages.deform(problem, initial, deadline)
-            refined = self.stages.refine(problem, deformed, cap, deadline)
+            refined = self.stages.refine(problem, deformed, spacing, cap, deadline)
             if self.config.guard and closest_distance(pairs, refined.points) < min(
                 0.0, closest_distance(pairs, deformed.points)
             ):
@@ -108,9 +108,7 @@ class EgoBackend:
                 detail=f"time limit of {time_limit:g} s",
             )  # fmt: skip
         curves = {
-            name: UniformBSpline(
-                problem.t_rep, self.spacing, self.degree, _standing(minimum.points, self.degree)
-            )
+            name: UniformBSpline(problem.t_rep, spacing, self.degree, _standing(minimum.points, self.degree))
             for name, minimum in (("deformation", deformed), ("refinement", refined))
         }
         converged = deformed.converged and refined.converged

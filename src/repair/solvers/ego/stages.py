@@ -49,8 +49,6 @@ class Stages:
     config : EgoConfig
     degree : int
         Degree of the B-spline.
-    spacing : float
-        Knot spacing [s].
     minimise : Minimiser, optional
         How the costs are minimised; as ``config.solver`` says where it is not given.
     sizes : Sizes
@@ -61,11 +59,10 @@ class Stages:
         self,
         config: EgoConfig,
         degree: int,
-        spacing: float,
         minimise: Minimiser | None = None,
         sizes: Sizes = SIZES,
     ) -> None:
-        self.config, self.degree, self.spacing, self.sizes = config, degree, spacing, sizes
+        self.config, self.degree, self.sizes = config, degree, sizes
         self.minimise = minimiser(config) if minimise is None else minimise
         c = config
         self._penalties = (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
@@ -88,27 +85,34 @@ class Stages:
         """
         config = self.config
         collision = config.deform.collision
-        greville = initial.greville
+        greville, spacing = initial.greville, initial.spacing
         shape = _led_points(problem, initial, greville)
         pairs = anchor_pairs(problem, greville, shape, self.degree)
         minimum = Minimum(initial.points, np.inf, 0, False)
         led = shape
         for rounds in range(1, config.rebounds + 2):
             cap = self._cap(problem, led)
-            minimum = self._minimise_deformation(problem, minimum.points, pairs, collision, cap, deadline)
+            minimum = self._minimise_deformation(
+                problem, minimum.points, spacing, pairs, collision, cap, deadline
+            )
             if rounds > config.rebounds:
                 break
             led = minimum.points
             clear = closest_distance(pairs, led) >= 0.0
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
-            if clear and (cap is None or self._slow_enough(problem, led)):
+            if clear and (cap is None or _slow_enough(problem, led, spacing)):
                 break
             if not clear:
                 collision *= 2.0
         return Deformed(minimum, pairs, cap, rounds)
 
     def refine(
-        self, problem: RepairProblem, deformed: Minimum, cap: Array | None, deadline: float | None
+        self,
+        problem: RepairProblem,
+        deformed: Minimum,
+        spacing: float,
+        cap: Array | None,
+        deadline: float | None,
     ) -> Minimum:
         """Minimise J' from the deformed curve; both axes are coupled by the fitting term.
 
@@ -117,6 +121,8 @@ class Stages:
         problem : RepairProblem
         deformed : Minimum
             Of the deformation; its first and last points are kept.
+        spacing : float
+            Of its knots [s].
         cap : (n - 1,) array or None
             The speeds that its bends allowed.
         deadline : float or None
@@ -132,21 +138,18 @@ class Stages:
         if n <= 2 * p:
             return deformed
         cost = SplineCost(
-            points[:, :axes], p, n - p, self.spacing, weights.smooth,
+            points[:, :axes], p, n - p, spacing, weights.smooth,
             self._bounds(problem, n, weights.feasible, cap),
-            fit=fitting_band(points, p, self.spacing, weights.fit, axes),
-            constant=self._resting(problem, points, weights), sizes=self.sizes,
+            fit=fitting_band(points, p, spacing, weights.fit, axes),
+            constant=self._resting(problem, points, spacing, weights), sizes=self.sizes,
         )  # fmt: skip
         return self._whole(cost, points, deadline, near_closed_form=True)
-
-    def _slow_enough(self, problem: RepairProblem, points: Array) -> bool:
-        allowed = 1.02 * self.spacing * bend_speed(problem, points)
-        return bool((points[1:, 0] - points[:-1, 0] <= allowed).all())
 
     def _minimise_deformation(
         self,
         problem: RepairProblem,
         start: Array,
+        spacing: float,
         pairs: Pairs,
         collision: float,
         cap: Array | None,
@@ -158,8 +161,9 @@ class Stages:
         axes = 2 if problem.lateral else 1
         bounds = with_pairs(self._bounds(problem, n, weights.feasible, cap), pairs, collision)
         cost = SplineCost(
-            start[:, :axes], self.degree, n, self.spacing, weights.smooth, bounds,
-            pairs.row * axes + pairs.axis, -pairs.sign, constant=self._resting(problem, start, weights),
+            start[:, :axes], self.degree, n, spacing, weights.smooth, bounds,
+            pairs.row * axes + pairs.axis, -pairs.sign,
+            constant=self._resting(problem, start, spacing, weights),
             sizes=self.sizes,
         )  # fmt: skip
         return self._whole(cost, start, deadline)
@@ -181,14 +185,14 @@ class Stages:
         return SoftBounds(limit, bounds.joint, bounds.sixfold, bounds.bend)
 
     def _resting(
-        self, problem: RepairProblem, points: Array, weights: DeformWeights | RefineWeights
+        self, problem: RepairProblem, points: Array, spacing: float, weights: DeformWeights | RefineWeights
     ) -> float:
         """What l costs where it may not move: a constant."""
         if problem.lateral or not np.count_nonzero(points[:, 1]):
             return 0.0
         n = len(points)
         bounds = feasibility(n, problem.limits, self._penalties, weights.feasible, (1,))
-        cost = SplineCost(points[:, 1:], 0, n, self.spacing, weights.smooth, bounds, sizes=self.sizes)
+        cost = SplineCost(points[:, 1:], 0, n, spacing, weights.smooth, bounds, sizes=self.sizes)
         return cost(np.zeros(n)).value
 
     def _whole(
@@ -202,6 +206,11 @@ class Stages:
         points = start.copy()
         points[:, :axes] = minimum.points
         return Minimum(points, minimum.cost, minimum.iterations, minimum.converged)
+
+
+def _slow_enough(problem: RepairProblem, points: Array, spacing: float) -> bool:
+    allowed = 1.02 * spacing * bend_speed(problem, points)
+    return bool((points[1:, 0] - points[:-1, 0] <= allowed).all())
 
 
 def _led_points(problem: RepairProblem, initial: UniformBSpline, times: Array) -> Array:
