@@ -45,6 +45,18 @@ def lanelet(name: int, x: Sequence[object], y: Sequence[float], *, width: float 
     )
 
 
+def strip(name: int, centre: np.ndarray, *, width: float = 4.0, after: Iterable[int] = (),
+          before: Iterable[int] = (), more: str = "") -> str:  # fmt: skip
+    """A lanelet along any centre line (M, 2), with its successors and predecessors."""
+    step = np.gradient(centre, axis=0)
+    normal = np.stack([-step[:, 1], step[:, 0]], axis=1) / np.hypot(*step.T)[:, None]
+    left, right = ("".join(point(*p) for p in centre + side * 0.5 * width * normal) for side in (1.0, -1.0))
+    links = "".join(f'<predecessor ref="{n}"/>' for n in before)
+    links += "".join(f'<successor ref="{n}"/>' for n in after)
+    bounds = f"<leftBound>{left}</leftBound><rightBound>{right}</rightBound>"
+    return f'<lanelet id="{name}">{bounds}{links}{more}</lanelet>'
+
+
 def car(name: int, start: str, prediction: str = "", *, shape: str | None = None) -> str:
     shape = shape or "<rectangle><length>4.5</length><width>1.8</width></rectangle>"
     body = f"<type>car</type><shape>{shape}</shape>{start}{prediction}"

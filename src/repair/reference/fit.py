@@ -11,6 +11,7 @@ from repair.curves.bases import basis_matrix, n_points_for
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import splice_points
 from repair.errors import ReferenceTrajectoryError
+from repair.scene.road.passes import along
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
@@ -51,7 +52,7 @@ def fit_positions(
     last = len(positions)
     if last < 4:
         raise ReferenceTrajectoryError(f"{what} is known for {last} steps only; a reference takes at least 4")
-    coordinates = scene.frame.to_frenet(positions)
+    coordinates = along(scene.frame, positions, float(scene.start[0, 0]))
     if not np.isfinite(coordinates).all():
         raise ReferenceTrajectoryError(
             f"{what} leaves the neighbourhood of the route and cannot be a reference"

@@ -19,6 +19,7 @@ from repair.scene.reading import read_file, require_commonroad
 from repair.scene.road.bounds import crossings, lateral_bounds
 from repair.scene.road.goal import goal_areas
 from repair.scene.road.lanes import Lane, lanes_of
+from repair.scene.road.passes import every_pass
 from repair.scene.road.route import Route, plan_route
 from repair.scene.scene import Scene
 from repair.scene.settings import SceneConfig
@@ -34,7 +35,8 @@ __all__ = ["load_scene", "scene_from_scenario", "with_traffic"]
 
 _HORIZON_MAX = 10.0  # unless the caller wants another [s]
 _HORIZON_DEFAULT = 5.0  # where neither a prediction nor a goal time says how long [s]
-_ROUTE_MAX = 400.0  # road ahead of the ego that is looked at [m]
+_ROUTE_MAX = 400.0  # road ahead of the ego that is looked at [m],
+_FASTER = 10.0  # or what is driven at this much more than the initial speed [m/s]
 
 
 def load_scene(
@@ -214,10 +216,13 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
 
     lanes, notes = lanes_of(scenario.lanelet_network)
     speed = max(ego.velocity, 0.0)
-    ahead = float(np.clip(speed * duration + duration**2 + 40.0, 80.0, _ROUTE_MAX))
+    farthest = max(_ROUTE_MAX, (speed + _FASTER) * duration)  # as often around a ring as that takes
+    ahead = float(np.clip(speed * duration + duration**2 + 40.0, 80.0, farthest))
     position = np.array([ego.x, ego.y])
     route = plan_route(lanes, position, ego.orientation, problem.goal, speed=speed, ahead=ahead)
-    lead_in = drive_path(route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing)
+    lead_in = drive_path(
+        route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing, near=route.start
+    )
     frame, s0 = lead_in.frame, lead_in.start
     notes += [*route.notes, *lead_in.notes]
     if route.road_ends and frame.length - s0 < speed * duration:
@@ -274,8 +279,7 @@ def _goal_s(
     if not named:
         entries = [np.asarray(area.exterior.coords)[:, :2] for area in goal_areas(goal)]
     starts = []
-    for points in entries:
-        projected = frame.to_frenet(points)
+    for projected in (found for points in entries for found in every_pass(frame, points)):
         close = projected[np.abs(projected[:, 1]) < 15.0]
         if len(close) and close[:, 0].max() >= s0 and close[:, 0].min() <= frame.length:
             starts.append(float(close[:, 0].min()))

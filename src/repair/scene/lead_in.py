@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ __all__ = ["LeadIn", "drive_path"]
 
 _BACK = 30.0  # path behind the ego, so that followers have coordinates [m]
 _COMFORT = 1.5  # lateral acceleration that the lead-in may add at the initial speed [m/s²]
+_GRIP = 0.88  # of the friction circle that the lead-in may use: a little less than what limits leave
+_BESIDE = 0.75  # how far beside the route it may run for a while [m]
 _SHARP = 0.25  # curvature of a centre line above which its kinks are smoothed harder [1/m]
 _STEEP = 0.6  # heading error above which the ego first turns towards the route [rad]
 
@@ -81,45 +84,80 @@ def _start_offsets(frame: FrenetFrame, s0: float, l0: float, error: float, curva
     return np.array([l0, slope, second - kappa * width])
 
 
-def _blend_length(frame: FrenetFrame, s0: float, start: Array, speed: float, limit: float) -> float:
+@dataclass(frozen=True)
+class _Blend:
+    """Offsets of the path from the route: a quintic to rest over ``length``, beside it at first by ``kept``.
+
+    Who comes in at an angle within a bend has turned in a few metres, and takes its time for the rest.
+    """
+
+    start: Array
+    length: float
+    kept: float = 0.0
+    rest: float = 1.0
+
+    def __call__(self, x: Array) -> Array:
+        """Offset, slope and second derivative (3, K) at ``x`` from the start on."""
+        beside = np.array([self.kept, 0.0, 0.0])
+        made = _quintic(self.start - beside, self.length, x)
+        return made + _quintic(beside, self.rest, x) if self.kept else made
+
+    def excess(self, frame: FrenetFrame, s0: float, speed: float, limit: float, grip: float) -> Array:
+        """Curvature, added lateral acceleration, and lateral acceleration, as shares of what they may be.
+
+        The last one is 0 where the route alone exceeds the grip. All are inf where the path would fold.
+        """
+        s = s0 + np.linspace(0.0, max(self.length, self.rest if self.kept else 0.0), 64)
+        offsets = self(s - s0)
+        along = frame.curvature(s)
+        if np.min(1.0 - along * offsets[0]) < 0.2:
+            return np.full(3, np.inf)
+        bend, usual = np.abs(_offset_curvature(frame, s, offsets)), np.abs(along)
+        pull = np.max(bend) * speed**2 / grip if np.max(usual) * speed**2 <= grip else 0.0
+        return np.array([np.max(bend) / limit, np.max(bend - usual) * speed**2 / _COMFORT, pull])
+
+
+def _blend(frame: FrenetFrame, s0: float, start: Array, speed: float, vehicle: Vehicle) -> _Blend:
     """Shortest blend whose curvature is drivable and adds a comfortable lateral acceleration."""
+    limit, grip = 0.8 * vehicle.largest_curvature(), _GRIP * vehicle.a_max
     least = max(8.0, 1.5 * speed)
     options = least * 1.15 ** np.arange(24)
     options = options[options <= max(least, 160.0)]
-    best, worst = options[0], np.inf
+    best, worst, pull = _Blend(start, float(options[0])), np.inf, 0.0
     for length in options:
-        s = s0 + np.linspace(0.0, length, 64)
-        offsets = _quintic(start, length, s - s0)
-        along = frame.curvature(s)
-        if np.min(1.0 - along * offsets[0]) < 0.2:
-            continue
-        kappa = _offset_curvature(frame, s, offsets)
-        excess = max(
-            np.max(np.abs(kappa)) / limit,
-            np.max(np.abs(kappa) - np.abs(along)) * speed**2 / _COMFORT,
-        )
+        tried = _Blend(start, float(length))
+        found = tried.excess(frame, s0, speed, limit, grip)
+        excess = max(found[0], found[1])
         if excess < worst - 1e-3:
-            best, worst = length, excess
+            best, worst, pull = tried, excess, found[2]
         if excess <= 1.0:
             break
-    return float(best)
+    if pull <= 1.0:
+        return best
+    for length, rest in itertools.product(least * np.array([0.5, 0.7, 1.0]), options[options > 2.0 * least]):
+        tried = _Blend(start, float(length), start[0] + 0.5 * start[1] * float(length), float(rest))
+        if abs(tried.kept) <= _BESIDE and np.max(tried.excess(frame, s0, speed, limit, grip)) <= 1.0:
+            return tried
+    return best
 
 
-def _turn_in(frame: FrenetFrame, pose: Array, limit: float) -> Array:
-    """Steer from a pose (x, y, heading) towards the route until the heading error is small.
+def _turn_in(frame: FrenetFrame, pose: Array, limit: float, near: float) -> tuple[Array, float]:
+    """Steer from a pose (x, y, heading) at about ``near`` towards the route until the heading error is small.
 
-    Pure pursuit with limited curvature, in steps of 0.25 m; returns the poses (K, 3).
+    Pure pursuit with limited curvature, in steps of 0.25 m; returns the poses (K, 3), and where along the
+    route the last one is.
     """
     step, ahead = 0.25, 6.0
     poses = [np.asarray(pose, dtype=np.float64)]
     kappa = 0.0
     for _ in range(400):
         x, y, heading = poses[-1]
-        s = frame.to_frenet(np.array([[x, y]]))[0, 0]
+        s = frame.to_frenet(np.array([[x, y]]), near=near)[0, 0]
         if not np.isfinite(s):
             break
+        near = float(s)
         if len(poses) > 1 and abs(wrap(heading - float(frame.heading(s)))) < 0.3:
-            return np.array(poses)
+            return np.array(poses), near
         target = frame.position(s + ahead) - np.array([x, y])
         alpha = wrap(np.arctan2(target[1], target[0]) - heading)
         wanted = np.clip(2.0 * np.sin(alpha) / np.hypot(*target), -limit, limit)
@@ -139,6 +177,7 @@ def drive_path(
     vehicle: Vehicle,
     *,
     smoothing: float = 0.15,
+    near: float | None = None,
 ) -> LeadIn:
     """Lay the frame along the path from the ego's pose onto the centre line.
 
@@ -157,6 +196,8 @@ def drive_path(
     vehicle : Vehicle
     smoothing : float
         How far smoothing may move the centre line [m]; more only to take out kinks (noted).
+    near : float, optional
+        About where the ego is along the centre line [m], which may pass it more than once.
 
     Raises
     ------
@@ -168,7 +209,7 @@ def drive_path(
     if tolerance > smoothing:
         notes.append(f"kinks of the centre line were smoothed by up to {tolerance:g} m")
     limit = 0.8 * vehicle.largest_curvature()
-    s0, l0 = frame.to_frenet(np.asarray(position)[None])[0]
+    s0, l0 = frame.to_frenet(np.asarray(position)[None], near=near)[0]
     if not np.isfinite(s0):
         raise ScenarioError("the ego's initial position cannot be projected on its route")
     curvature = float(np.clip(frame.curvature(s0) / (1.0 - frame.curvature(s0) * l0), -limit, limit))
@@ -179,19 +220,19 @@ def drive_path(
         notes.append(
             f"the ego starts {np.rad2deg(error):.0f} degrees off its route and first turns towards it"
         )
-        poses = _turn_in(frame, np.array([*position, direction]), limit)
+        poses, s1 = _turn_in(frame, np.array([*position, direction]), limit, s0)
         turn = poses[:-1, :2]
         curvature = (poses[-1, 2] - poses[-2, 2]) / 0.25
-        s1, l1 = frame.to_frenet(poses[-1:, :2])[0]
+        s1, l1 = frame.to_frenet(poses[-1:, :2], near=s1)[0]
         error = wrap(poses[-1, 2] - float(frame.heading(s1)))
     else:
         s1, l1 = s0, l0
     start = _start_offsets(frame, s1, l1, error, curvature)
-    length = _blend_length(frame, s1, start, speed, limit)
+    blend = _blend(frame, s1, start, speed, vehicle)
     end = max(frame.length, s1 + 1.0)
     grid = s1 + np.arange(0.0, end - s1, 0.5)
     grid = np.append(grid[: max(1, len(grid) - 1)], end)
-    ahead = frame.to_cartesian(grid, _quintic(start, length, grid - s1)[0])
+    ahead = frame.to_cartesian(grid, blend(grid - s1)[0])
     if len(turn):
         # behind a start across the route, the path is straight: along the ego's own axis
         back = np.arange(_BACK, 0.0, -0.5)
@@ -199,7 +240,7 @@ def drive_path(
     else:
         mirror = start * np.array([1.0, -1.0, 1.0])
         back = np.arange(_BACK, 0.0, -0.5)
-        behind = frame.to_cartesian(s1 - back, _quintic(mirror, max(length, 10.0), back)[0])
+        behind = frame.to_cartesian(s1 - back, _quintic(mirror, max(blend.length, 10.0), back)[0])
     path = FrenetFrame.from_points(np.concatenate([behind, turn, ahead]), smoothing=0.0)
     where = path.to_frenet(np.asarray(position)[None], near=_BACK)[0]
-    return LeadIn(path, float(where[0]), length, tuple(notes))
+    return LeadIn(path, float(where[0]), max(blend.length, blend.rest), tuple(notes))

@@ -11,6 +11,7 @@ from repair.arrays import Array, frozen
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import crossings, lateral_bounds
 from repair.scene.road.lanes import lanes_of
+from repair.scene.road.passes import along
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
@@ -46,7 +47,7 @@ def reframe(scene: Scene, positions: Array) -> Scene:
     if len(recorded) < 4:
         return scene
     old = scene.frame
-    s_end, l_end = old.to_frenet(recorded[-1:])[0]
+    s_end, l_end = along(old, recorded, float(scene.start[0, 0]))[-1]
     direction = recorded[-1] - recorded[-2]
     if np.isfinite(s_end) and abs(_turn(direction, float(old.heading(s_end)))) < _JOIN_TURN:
         ahead = np.arange(_SPACING, max(old.length - s_end, _SPACING * 2), 1.0)

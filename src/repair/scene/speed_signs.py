@@ -10,6 +10,7 @@ import numpy as np
 from repair.arrays import frozen
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.lanes import Lane
+from repair.scene.road.passes import every_pass
 from repair.scene.road.route import Route
 from repair.scene.scene import SpeedLimit
 from repair.scene.start import SPEED_RANGE
@@ -48,10 +49,11 @@ def speed_limit_along(
         except (AssertionError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
             notes.append(f"the traffic signs of lanelet {name} cannot be read ({error})")
             limit = None
-        entry = frame.to_frenet(lanes[name].center[:1])[0, 0]
+        before = entries[-1][0] if entries else 0.0
+        found = [float(one[0, 0]) for one in every_pass(frame, lanes[name].center[:1])]
+        later = [entry for entry in found if entry > before + 1e-6]
         # a lanelet that begins before the path counts from its start on
-        begin = 0.0 if not np.isfinite(entry) else float(np.clip(entry, 0.0, frame.length))
-        begin = begin if not entries else max(begin, entries[-1][0])
+        begin = float(np.clip(min(later, default=before), before, frame.length))
         entries.append(
             (begin, np.inf if limit is None or not 0.0 < limit <= SPEED_RANGE[1] else float(limit))
         )

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.curves.base import FrenetTrajectory
+from repair.scene.road.passes import every_pass
 from repair.timegrid import INSTANT
 from repair.world.boxes import Occupancy
 
@@ -46,50 +47,65 @@ def build_occupancy(
     Returns
     -------
     Occupancy
-        One row for each obstacle, in order; none is left out.
+        One row for each obstacle, in order; none is left out. Where the frame passes a place more than once
+        (a ring of more than a lap), further rows for each further pass that has the obstacle beside it.
     notes : tuple of str
         Which obstacles leave the frame's domain of projection, and when.
     """
     steps = len(obstacles[0].vertices) if obstacles else 1
-    count = len(obstacles)
-    lower = np.full((count, steps, 2), np.nan)
-    upper = np.full((count, steps, 2), np.nan)
+    passes = _project_all(obstacles, frame) if obstacles else [[]]
+    corners: list[tuple[Array, Array]] = []
+    which: list[int] = []
     notes: list[str] = []
-    if count:
-        projected = _project_all(obstacles, frame)
     inflate = np.array([s_offset, l_offset])
+    for turn, projected in enumerate(passes):
+        for k, points in enumerate(projected):
+            low, high = _box(points, obstacles[k], inflate)
+            if turn == 0 or np.isfinite(low).any():
+                corners.append((low, high))
+                which.append(k)
     for k, obstacle in enumerate(obstacles):
-        points = projected[k]
-        known = np.asarray(np.isfinite(points).all(axis=-1))
         present = np.asarray(np.isfinite(obstacle.vertices).all(axis=(1, 2)))
-        seen = known.any(axis=1) & present
-        if seen.any():
-            masked = np.where(known[seen][..., None], points[seen], np.nan)
-            lower[k, seen] = np.nanmin(masked, axis=1) - inflate
-            upper[k, seen] = np.nanmax(masked, axis=1) + inflate
-        hidden = present & ~known.all(axis=1)
+        whole = [np.isfinite(projected[k]).all(axis=(1, 2)) for projected in passes]
+        hidden = present & ~np.logical_or.reduce(whole)
         if hidden.any():
             first = float(np.flatnonzero(hidden)[0] * dt)
             notes.append(
                 f"obstacle {obstacle.id} is (partly) outside of the frame's domain from t = {first:g} s; "
                 "only the check of the true shapes sees it there"
             )
-    ids = np.array([o.id for o in obstacles], dtype=np.int64)
-    static = np.array([o.role in ("static", "environment") for o in obstacles], dtype=np.bool_)
+    ids = np.array([obstacles[k].id for k in which], dtype=np.int64)
+    static = np.array([obstacles[k].role in ("static", "environment") for k in which], dtype=np.bool_)
     t = frozen(np.arange(steps) * dt)
+    lower, upper = np.array(corners).reshape(-1, 2, steps, 2).transpose(1, 0, 2, 3)
     return Occupancy(t, ids, frozen(lower), frozen(upper), static), tuple(notes)
 
 
-def _project_all(obstacles: Sequence[Obstacle], frame: FrenetFrame) -> list[Array]:
-    """Frenet coordinates of all outlines, in one call (the search tree is queried once)."""
+def _box(points: Array, obstacle: Obstacle, inflate: Array) -> tuple[Array, Array]:
+    """Inflated corners (T, 2) around what is known of an outline (T, V, 2); NaN where that is nothing."""
+    known = np.asarray(np.isfinite(points).all(axis=-1))
+    seen = known.any(axis=1) & np.isfinite(obstacle.vertices).all(axis=(1, 2))
+    lower, upper = np.full((2, len(points), 2), np.nan)
+    if seen.any():
+        masked = np.where(known[seen][..., None], points[seen], np.nan)
+        lower[seen] = np.nanmin(masked, axis=1) - inflate
+        upper[seen] = np.nanmax(masked, axis=1) + inflate
+    return lower, upper
+
+
+def _project_all(obstacles: Sequence[Obstacle], frame: FrenetFrame) -> list[list[Array]]:
+    """Frenet coordinates of all outlines, for each pass of the frame in one call."""
     shapes = [o.vertices.shape for o in obstacles]
     stacked = np.concatenate([o.vertices.reshape(-1, 2) for o in obstacles])
-    result = np.full(stacked.shape, np.nan)
     finite = np.isfinite(stacked).all(axis=1)
-    if finite.any():
-        result[finite] = frame.to_frenet(stacked[finite])
     sizes = np.cumsum([s[0] * s[1] for s in shapes])[:-1]
-    return [part.reshape(shape) for part, shape in zip(np.split(result, sizes), shapes, strict=True)]
+    passes = []
+    for found in every_pass(frame, stacked[finite]):
+        result = np.full(stacked.shape, np.nan)
+        result[finite] = found
+        parts = zip(np.split(result, sizes), shapes, strict=True)
+        passes.append([part.reshape(shape) for part, shape in parts])
+    return passes
 
 
 def shrink_to_start(

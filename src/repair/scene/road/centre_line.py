@@ -12,7 +12,8 @@ from repair.scene.road.lanes import Lane, locate
 __all__ = ["BEHIND", "centre_line", "cut_line", "direction_at"]
 
 BEHIND = 45.0  # centre line behind the ego [m]
-_FAR = 450.0  # centre line ahead of the ego at most [m]
+_FAR = 450.0  # centre line ahead of the ego at most, unless more is wanted [m]
+_NEAR = 30.0  # the ego is looked for so far [m] around the place where it has to be
 
 
 def direction_at(line: Array, end: int, sign: float) -> float:
@@ -84,19 +85,26 @@ def centre_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float) 
     return np.array(line)
 
 
-def cut_line(line: Array, position: Array) -> tuple[Array, bool]:
-    """The part of a centre line around the ego, and whether its far end was cut off.
+def cut_line(line: Array, position: Array, near: float, ahead: float) -> tuple[Array, float, bool]:
+    """The part of a centre line around the ego, the ego's place along it, and whether its far end was cut.
 
     Parameters
     ----------
     line : (M, 2) array
     position : (2,) array
         Of the ego [m].
+    near : float
+        About where it is along the line [m]: a line may pass it more than once.
+    ahead : float
+        Road that is wanted before the ego [m].
     """
     chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    here = locate(line, position)[0]
-    low, high = max(here - 2.0 * BEHIND, 0.0), min(here + _FAR, float(chord[-1]))
+    first = max(int(np.searchsorted(chord, near - _NEAR)) - 1, 0)
+    last = int(np.searchsorted(chord, near + _NEAR)) + 1
+    here = float(chord[first]) + locate(line[first:last], position)[0]
+    far = max(_FAR, ahead + 50.0)
+    low, high = max(here - 2.0 * BEHIND, 0.0), min(here + far, float(chord[-1]))
     inside = (chord > low) & (chord < high)
     arc = np.concatenate([[low], chord[inside], [high]])
     part = np.stack([np.interp(arc, chord, line[:, 0]), np.interp(arc, chord, line[:, 1])], axis=1)
-    return part, high < chord[-1]
+    return part, here - low, bool(high < chord[-1])

@@ -33,7 +33,10 @@ class Route:
     behind : tuple of int
         Those before, as far as the centre line reaches back.
     center : (M, 2) array
-        The centre line [m], from about 45 m behind the ego to the end of the route.
+        The centre line [m], from about 45 m behind the ego to the end of the route. A ring is in it as often
+        as it is driven.
+    start : float
+        Where the ego is along it [m].
     goal_lanelets : tuple of int
         Those of ``lanelets`` that belong to the goal.
     road_ends : bool
@@ -44,6 +47,7 @@ class Route:
     lanelets: tuple[int, ...]
     behind: tuple[int, ...]
     center: Array
+    start: float
     goal_lanelets: tuple[int, ...]
     road_ends: bool
     notes: tuple[str, ...]
@@ -242,10 +246,8 @@ def plan_route(
     while remaining < ahead:
         here = lanes[path[-1]]
         following = _straightest(lanes, here, here.successors)
-        if following is None or following in path:
-            road_ends = following is None
-            if following is not None:
-                notes.append(f"the route would drive lanelet {following} a second time and stops before it")
+        if following is None:
+            road_ends = True
             break
         path.append(following)
         remaining += lanes[following].length
@@ -254,12 +256,12 @@ def plan_route(
     while room < BEHIND:
         here = lanes[behind[0] if behind else path[first]]
         previous = _straightest(lanes, here, here.predecessors, back=True)
-        if previous is None or previous in path or previous in behind:
+        if previous is None:
             break
         behind.insert(0, previous)
         room += lanes[previous].length
     center = centre_line(behind + path[first:], lanes, float(np.clip(4.0 * speed, 20.0, 80.0)))
-    center, cut = cut_line(center, position)
+    center, start, cut = cut_line(center, position, room, ahead)
     road_ends = road_ends and not cut
     reached = tuple(i for i in path if i in targets)
-    return Route(tuple(path), tuple(behind), frozen(center), reached, road_ends, tuple(notes))
+    return Route(tuple(path), tuple(behind), frozen(center), start, reached, road_ends, tuple(notes))
