@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from repair.config import Config, load_config, preset_names
     from repair.curves.base import FrenetTrajectory
     from repair.curves.bspline import UniformBSpline
+    from repair.cycle import Cycle, Repairer
     from repair.errors import (
         BackendError,
         ConfigError,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from repair.save import register as register_format
     from repair.scene.commonroad import load_scene, scene_from_scenario, with_traffic
     from repair.scene.scene import Scene
-    from repair.scene.traffic.given import Prediction, predictions_of
+    from repair.scene.traffic.prediction import Prediction, predictions_of
     from repair.search.modes import ModeResult
     from repair.search.result import Probe, SearchResult, SearchStatus
     from repair.situation import Situation
@@ -64,6 +65,7 @@ __all__ = [
     "Config",
     "ConfigError",
     "Conflict",
+    "Cycle",
     "FrenetTrajectory",
     "Maneuver",
     "ModeResult",
@@ -78,6 +80,7 @@ __all__ = [
     "RepairError",
     "RepairProblem",
     "RepairResult",
+    "Repairer",
     "ScenarioError",
     "Scene",
     "SearchResult",
@@ -115,6 +118,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.check.verdict": ("Conflict", "Reason", "Verdict"),
     "repair.config": ("Config", "load_config", "preset_names"),
     "repair.curves.base": ("FrenetTrajectory",),
+    "repair.cycle": ("Cycle", "Repairer"),
     "repair.curves.bspline": ("UniformBSpline",),
     "repair.errors": (
         "BackendError", "ConfigError", "OutputError", "ReferenceTrajectoryError", "RepairError",
@@ -127,7 +131,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.search.modes": ("ModeResult",),
     "repair.scene.commonroad": ("load_scene", "scene_from_scenario", "with_traffic"),
     "repair.scene.scene": ("Scene",),
-    "repair.scene.traffic.given": ("Prediction", "predictions_of"),
+    "repair.scene.traffic.prediction": ("Prediction", "predictions_of"),
     "repair.search.result": ("Probe", "SearchResult", "SearchStatus"),
     "repair.situation": ("Situation",),
     "repair.solvers.registry": ("backend_names",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -39,7 +39,7 @@ from repair.vehicle.states import DrivenStates
 if TYPE_CHECKING:
     from repair.search.settings import SearchConfig
 
-__all__ = ["RepairResult", "find", "repair", "search"]
+__all__ = ["RepairResult", "find", "make", "repair", "search"]
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def repair(
     elif not isinstance(config, Config):
         raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
     require_types(config)
-    backend = _made(config)
+    backend = make(config)
     phases = Phases()
     with phases("load"):
         scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
@@ -212,7 +212,7 @@ def repair(
     )
 
 
-def _made(config: Config) -> RepairBackend:
+def make(config: Config) -> RepairBackend:
     """The backend that is asked for; whatever its factory raises is an error of the backend."""
     with foreign(f"making backend {config.backend!r}", BackendError):
         return make_backend(config.backend, config)
@@ -272,6 +272,7 @@ def find(
     asked: Asked | None = None,
     on_probe: Callable[[Probe], None] | None = None,
     settings: SearchConfig | None = None,
+    visits: Sequence[float] | None = None,
 ) -> SearchResult:
     """The search alone, as the configuration (or other ``settings`` of the search) describes it.
 
@@ -279,6 +280,8 @@ def find(
     ----------
     asked : Asked, optional
         Where the TTR is kept that ``driver: at_ttr`` needs.
+    visits : sequence of float, optional
+        The times-to-repair to try [s], instead of those of the search's rule.
 
     Raises
     ------
@@ -292,8 +295,9 @@ def find(
     backend = Guarded(backend, prepared.config.backend)
     if prepared.config.driver != "at_ttr":
         return search_f_ttr(
-            prepared.source, prepared.conflict, backend, prepared.checker, settings, on_probe=on_probe
-        )
+            prepared.source, prepared.conflict, backend, prepared.checker, settings,
+            visits=visits, on_probe=on_probe,
+        )  # fmt: skip
     begin = time.perf_counter()
     try:
         with until(None if limit is None else begin + limit):

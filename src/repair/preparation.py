@@ -27,7 +27,7 @@ from repair.situation import Situation
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.world.occupancy import build_occupancy, shrink_to_start
 
-__all__ = ["Phases", "Prepared", "among", "prepare"]
+__all__ = ["Phases", "Prepared", "among", "laid_out", "prepare"]
 
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
@@ -100,19 +100,37 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
         chosen = config.reference.obstacle_id
         if chosen is not None and SOURCES[config.reference.source].becomes_ego:
             scene = as_ego(scene, chosen)
-    return _laid_out(scene, config, given, phases, None)
+    return laid_out(scene, config, given, phases)
 
 
 def among(prepared: Prepared, obstacles: tuple[Obstacle, ...]) -> Prepared:
     """The same road, ego and reference among other traffic."""
     scene = replace(prepared.scene, obstacles=obstacles)
-    return _laid_out(scene, prepared.config, prepared.given, Phases(), prepared.reference)
+    reference, like = prepared.reference, prepared.checker
+    return laid_out(scene, prepared.config, prepared.given, Phases(), reference=reference, like=like)
 
 
-def _laid_out(
-    scene: Scene, config: Config, given: GivenReference | None, phases: Phases, reference: Curve | None
+def laid_out(
+    scene: Scene,
+    config: Config,
+    given: GivenReference | None,
+    phases: Phases,
+    *,
+    reference: Curve | None = None,
+    like: Checker | None = None,
 ) -> Prepared:
-    """What is searched, with a reference that there is already or with that of the configuration."""
+    """What is searched, in a frame that stays as it is.
+
+    Parameters
+    ----------
+    given : GivenReference or None
+        The reference from memory; without it, and without ``reference``, that of the configuration is made.
+    phases : Phases
+    reference : Curve, optional
+        A reference that there is already.
+    like : Checker, optional
+        One for the same road, whose edge is taken over.
+    """
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
     room = config.checker.clearance + _BODY_MARGIN
@@ -122,7 +140,7 @@ def _laid_out(
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset)
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
     with phases("checker"):
-        checker = Checker(scene, limits, config.checker)
+        checker = Checker(scene, limits, config.checker, like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
     with phases("reference"):

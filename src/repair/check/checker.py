@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.arrays import Array, Points, frozen, wrap
+from repair.check.edge import RoadEdge, road_edge
 from repair.check.limits import Excess, curve_excess, plane_excess, surely_kept
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
@@ -27,8 +28,6 @@ from repair.vehicle.states import DrivenStates
 from repair.world.boxes import Occupancy
 from repair.world.collision import CollisionWorld, Contact
 from repair.world.occupancy import first_entry
-from repair.world.road import RoadBoundary
-from repair.world.road_corridor import RoadCorridor
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
@@ -55,13 +54,18 @@ class Checker:
     scene : Scene
     limits : Limits
     config : CheckerConfig
+    like : Checker, optional
+        Another one, whose edge of the road is taken over where road, vehicle and gap are the same.
     """
 
-    def __init__(self, scene: Scene, limits: Limits, config: CheckerConfig) -> None:
+    def __init__(
+        self, scene: Scene, limits: Limits, config: CheckerConfig, like: Checker | None = None
+    ) -> None:
         self.scene, self.limits, self.config = scene, limits, config
         self.world = CollisionWorld(scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps)
-        self.road = RoadBoundary(scene.scenario, scene.vehicle, config.road_gap) if config.road else None
-        self._corridor = RoadCorridor(self.road, scene.frame, scene.vehicle) if self.road else None
+        before = None if like is None else like.edge
+        self.edge: RoadEdge | None = road_edge(scene, config.road_gap, before) if config.road else None
+        self.road = None if self.edge is None else self.edge.boundary
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: _Followed | None = None
@@ -220,9 +224,9 @@ class Checker:
 
     def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
         """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
-        if self.road is None or self._corridor is None:
+        if self.road is None or self.edge is None:
             return None
-        held = self._corridor.holds(s, centre, orientation)
+        held = self.edge.corridor.holds(s, centre, orientation)
         if np.count_nonzero(held) == len(held):
             return None
         unsure = np.flatnonzero(~held)

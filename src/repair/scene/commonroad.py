@@ -21,7 +21,7 @@ from repair.scene.road.goal import goal_areas
 from repair.scene.road.lanes import Lane, lanes_of
 from repair.scene.road.passes import every_pass
 from repair.scene.road.route import Route, plan_route
-from repair.scene.scene import Scene
+from repair.scene.scene import InitialState, Scene
 from repair.scene.settings import SceneConfig
 from repair.scene.speed_signs import speed_limit_along
 from repair.scene.start import first_step_of, initial_state_of, is_ego
@@ -31,7 +31,7 @@ from repair.settings import keys_of, require_type
 from repair.timegrid import steps_until
 from repair.vehicle.model import vehicle_model
 
-__all__ = ["load_scene", "scene_from_scenario", "with_traffic"]
+__all__ = ["load_scene", "moved_on", "scene_from_scenario", "with_traffic"]
 
 _HORIZON_MAX = 10.0  # unless the caller wants another [s]
 _HORIZON_DEFAULT = 5.0  # where neither a prediction nor a goal time says how long [s]
@@ -180,6 +180,25 @@ def with_traffic(scene: Scene, traffic: Iterable[Any], *, threshold: float = 0.0
     scenario, modes, notes = given_scenario(scene.scenario, scene.initial_time_step, traffic, threshold)
     made = _quiet(scenario, scene.planning_problem, scene.settings)
     return replace(made, id=scene.id, modes=modes, notes=(*made.notes, *notes))
+
+
+def moved_on(scene: Scene, ego: InitialState) -> Scene:
+    """The scene laid out anew from where the ego is now, for the same goal.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no road at that place.
+    """
+    from commonroad.planning.planning_problem import PlanningProblem
+    from commonroad.scenario.state import InitialState as State
+
+    state = State(
+        time_step=scene.initial_time_step, position=np.array([ego.x, ego.y]), orientation=ego.orientation,
+        velocity=ego.velocity, acceleration=ego.acceleration, yaw_rate=ego.yaw_rate, slip_angle=0.0,
+    )  # fmt: skip
+    problem = PlanningProblem(scene.planning_problem_id, state, scene.planning_problem.goal)
+    return replace(_quiet(scene.scenario, problem, scene.settings), id=scene.id)
 
 
 def _require_objects(scenario: Any, problem: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import numpy as np
 from repair.arrays import Array, frozen
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import crossings, lateral_bounds
-from repair.scene.road.lanes import lanes_of
+from repair.scene.road.lanes import Lane, lanes_of
 from repair.scene.road.passes import along
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _JOIN_SLOPE = 5.0  # so many metres for each metre that it lies beside the route
 _JOIN = 15.0  # length over which the recorded path runs into the route again [m]
 
 
-def reframe(scene: Scene, positions: Array) -> Scene:
+def reframe(scene: Scene, positions: Array, lanes: Mapping[int, Lane] | None = None) -> Scene:
     """Lay the frame along recorded centre positions (T, 2), then on along the old frame.
 
     Where the recording ends across the route or against it, the frame goes straight on instead: a path back
@@ -38,6 +39,8 @@ def reframe(scene: Scene, positions: Array) -> Scene:
     scene : Scene
     positions : (T, 2) array
         [m]; of fewer than four different ones no path is made, and the scene stays as it is.
+    lanes : mapping, optional
+        Those of the scene's map, where they are known already.
     """
     path = [positions[0]]
     for point in positions[1:]:
@@ -62,7 +65,8 @@ def reframe(scene: Scene, positions: Array) -> Scene:
     frame = FrenetFrame.from_points(np.concatenate([behind, recorded, following]), smoothing=0.1)
     s0, l0 = frame.to_frenet(positions[:1], near=np.array([30.0]))[0]
     speed, acceleration = scene.start[1, 0], scene.start[2, 0]
-    lanes, _ = lanes_of(scene.scenario.lanelet_network)
+    if lanes is None:
+        lanes, _ = lanes_of(scene.scenario.lanelet_network)
     found = crossings(frame, lanes)
     half = scene.vehicle.half_width
     return replace(

@@ -14,8 +14,8 @@ from repair.arrays import Array
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
 from repair.scene.settings import SceneConfig
-from repair.scene.traffic.given import Mode
 from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.prediction import Mode
 from repair.scene.traffic.stepwise import expand_intervals
 from repair.vehicle.model import VehicleModel
 from repair.vehicle.parameters import Vehicle

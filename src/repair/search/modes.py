@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from repair.scene.traffic.given import Mode
 from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.prediction import Mode
 from repair.search.result import SearchResult
 
 __all__ = ["ModeResult", "each_mode"]

@@ -5,8 +5,7 @@ Predictions become CommonRoad obstacles, so that they are read, judged and writt
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from numbers import Integral
 from typing import Any
 
@@ -14,108 +13,12 @@ import numpy as np
 
 from repair.arrays import Array
 from repair.errors import ScenarioError, foreign, in_words, kind_of
+from repair.scene.traffic.prediction import WHAT as _WHAT
+from repair.scene.traffic.prediction import Mode, Prediction, name_of, size_of
 
-__all__ = ["Mode", "Prediction", "given_scenario", "predictions_of"]
+__all__ = ["given_scenario", "known_rows", "speeds_along", "standing_as"]
 
-_WHAT = "the given traffic"
 _FAR = 1_000_000  # ids of further modes begin here
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Where an obstacle will be, as one mode of a prediction has it.
-
-    Attributes
-    ----------
-    id : int
-        Positive. Several predictions with one id are modes of that obstacle.
-    poses : (T, 3) array or None
-        ``x, y`` [m] and ``yaw`` [rad] of the obstacle's centre at the scenario's steps from the planning
-        problem's start on; rows of NaN at the beginning or the end where it is not there.
-    length, width : float
-        Of its rectangle [m].
-    occupancies : sequence of (V, 2) array, or None
-        Instead of poses: the set in which it is from step to step, a polygon [m] for each.
-    kind : str
-        CommonRoad obstacle type, such as ``car``.
-    probability : float
-        Of this mode.
-    mode : str
-        Its name.
-    """
-
-    id: int
-    poses: Any = None
-    length: float | None = None
-    width: float | None = None
-    occupancies: Sequence[Any] | None = None
-    kind: str = "car"
-    probability: float = 1.0
-    mode: str = ""
-
-
-@dataclass(frozen=True)
-class Mode:
-    """One of several predictions of an obstacle, and the id under which it is among the traffic."""
-
-    obstacle_id: int
-    name: str
-    probability: float
-    stands_as: int
-
-
-def predictions_of(
-    boxes: Any, *, length: Any = None, width: Any = None, ids: Sequence[int] | None = None, kind: str = "car"
-) -> list[Prediction]:
-    """Predictions of many obstacles from one array.
-
-    Parameters
-    ----------
-    boxes : (N, T, 3) or (N, T, 5) array
-        ``x, y, yaw`` of the centres at the scenario's steps, and with five columns ``length, width`` too
-        (constant over time); NaN where an obstacle is not there.
-    length, width : float or (N,) array
-        [m], where the array has three columns.
-    ids : sequence of int, optional
-        1, 2, ... by default.
-    kind : str
-        CommonRoad obstacle type.
-
-    Raises
-    ------
-    ScenarioError
-        If the shapes do not fit.
-    """
-    with foreign(_WHAT, ScenarioError):
-        table = np.asarray(boxes, dtype=np.float64)
-    if table.ndim != 3 or table.shape[2] not in (3, 5):
-        raise ScenarioError(f"{_WHAT} is of shape {table.shape}; boxes are (N, T, 3) or (N, T, 5)")
-    count = len(table)
-    names = list(range(1, count + 1)) if ids is None else [int(i) for i in ids]
-    if len(names) != count:
-        raise ScenarioError(f"{_WHAT} has {count} obstacles and {len(names)} ids")
-    if table.shape[2] == 5:
-        if length is not None or width is not None:
-            raise ScenarioError(f"{_WHAT} holds its sizes; leave length and width out")
-        sizes = table[:, :, 3:]
-        if count and float(np.nanmax(np.nanmax(sizes, axis=1) - np.nanmin(sizes, axis=1))) > 1e-9:
-            raise ScenarioError(
-                f"{_WHAT}: the size of an obstacle changes over time; give occupancies instead"
-            )
-        size = np.nanmax(sizes, axis=1) if count else np.zeros((0, 2))
-    else:
-        if length is None or width is None:
-            raise ScenarioError(f"{_WHAT} is of shape {table.shape}; it takes length and width as well")
-        try:
-            size = np.stack(
-                [np.broadcast_to(np.asarray(v, dtype=np.float64), count) for v in (length, width)], 1
-            )
-        except ValueError as error:
-            raise ScenarioError(f"{_WHAT}: length and width do not fit {count} obstacles") from error
-    return [
-        Prediction(name, rows[:, :3], float(a), float(b), kind=kind)
-        for name, rows, (a, b) in zip(names, table, size, strict=True)
-    ]
 
 
 def given_scenario(
@@ -161,7 +64,7 @@ def given_scenario(
     made.replace_lanelet_network(old.lanelet_network)
     things = list(traffic)
     roads = _ids_of(old.lanelet_network)
-    chosen, modes, notes = _modes([p for p in things if isinstance(p, Prediction)], threshold, roads)
+    chosen, modes, notes = standing_as([p for p in things if isinstance(p, Prediction)], threshold, roads)
     for name, prediction in chosen:
         _add(made, _obstacle(prediction, name, first_step, float(old.dt)), name)
     for thing in (t for t in things if not isinstance(t, Prediction)):
@@ -181,7 +84,7 @@ def _ids_of(network: Any) -> set[int]:
     return found
 
 
-def _modes(
+def standing_as(
     predictions: list[Prediction], threshold: float, roads: set[int]
 ) -> tuple[list[tuple[int, Prediction]], tuple[Mode, ...], list[str]]:
     """Who is looked at, and under which id."""
@@ -219,9 +122,7 @@ def _add(scenario: Any, obstacle: Any, name: int) -> None:
 
 def _obstacle(prediction: Prediction, name: int, first: int, dt: float) -> Any:
     """A prediction as a CommonRoad obstacle."""
-    what = f"prediction of obstacle {prediction.id}"
-    if prediction.mode:
-        what += f", {prediction.mode}"
+    what = name_of(prediction)
     if (prediction.poses is None) == (prediction.occupancies is None):
         raise ScenarioError(f"{what}: either poses or occupancies are given")
     if not 0.0 <= prediction.probability <= 1.0:
@@ -242,7 +143,7 @@ def _type(kind: str, what: str) -> Any:
         raise ScenarioError(f"{what}: there is no kind {in_words(kind)}; there are {known}") from error
 
 
-def _rows(poses: Any, what: str) -> tuple[int, Array]:
+def known_rows(poses: Any, what: str) -> tuple[int, Array]:
     """The first row that is there, and all from there on to the last (K, 3)."""
     table = np.asarray(poses, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 3 or not len(table):
@@ -268,15 +169,11 @@ def _moving(prediction: Prediction, name: int, first: int, dt: float, what: str)
     from commonroad.scenario.state import CustomState, InitialState
     from commonroad.scenario.trajectory import Trajectory
 
-    length, width = prediction.length, prediction.width
-    if not all(v is not None and np.isfinite(v) and v > 0.0 for v in (length, width)):
-        raise ScenarioError(
-            f"{what}: length and width are {length!r} and {width!r}; both have to be positive"
-        )
-    begin, rows = _rows(prediction.poses, what)
+    length, width = size_of(prediction)
+    begin, rows = known_rows(prediction.poses, what)
     rows[:, 2] = np.arctan2(np.sin(rows[:, 2]), np.cos(rows[:, 2]))
-    shape = Rectangle(float(length or 0.0), float(width or 0.0))
-    speed = _speeds(rows, dt)
+    shape = Rectangle(length, width)
+    speed = speeds_along(rows, dt)
     start = InitialState(
         time_step=first + begin, position=rows[0, :2], orientation=float(rows[0, 2]),
         velocity=float(speed[0]), acceleration=0.0, yaw_rate=0.0, slip_angle=0.0,
@@ -295,7 +192,7 @@ def _moving(prediction: Prediction, name: int, first: int, dt: float, what: str)
     return DynamicObstacle(name, _type(prediction.kind, what), shape, start, known)
 
 
-def _speeds(rows: Array, dt: float) -> Array:
+def speeds_along(rows: Array, dt: float) -> Array:
     """Speeds along the headings (K,) [m/s], by central differences."""
     if len(rows) < 2:
         return np.zeros(len(rows))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
 
 from repair.arrays import Array
 
-__all__ = ["Obstacle"]
+__all__ = ["Obstacle", "later"]
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,19 @@ class Obstacle:
     def n_steps(self) -> int:
         """Index of the last step; ``vertices`` has one row more."""
         return len(self.vertices) - 1
+
+
+def later(obstacle: Obstacle, step: int) -> Obstacle | None:
+    """The obstacle with time beginning at a later step; None where it is not there any more."""
+    if step == 0:
+        return obstacle
+    if step > obstacle.n_steps or not np.isfinite(obstacle.vertices[step:]).any():
+        return None
+    return replace(
+        obstacle,
+        vertices=obstacle.vertices[step:],
+        rectangles=None if obstacle.rectangles is None else obstacle.rectangles[step:],
+        circles=None if obstacle.circles is None else obstacle.circles[step:],
+        polygons=obstacle.polygons[step:],
+        states=obstacle.states[step:],
+    )

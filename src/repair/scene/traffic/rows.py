@@ -12,12 +12,12 @@ from repair.errors import ScenarioError
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.shapes import FAR, Placed, polygons_of, subdivided
 
-__all__ = ["obstacle_of_rows", "repeated", "require_sane"]
+__all__ = ["obstacle_of_rows", "repeated", "require_sane", "rigid_outline"]
 
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
 
-def _rigid_outline(rectangles: Array) -> Array | None:
+def rigid_outline(rectangles: Array) -> Array | None:
     """Outlines of one rectangle on its way, all at once; None where its size changes."""
     half = rectangles[np.isfinite(rectangles[:, 0]), 3:]
     if np.ptp(half, axis=0).any():
@@ -63,7 +63,7 @@ def obstacle_of_rows(
         circles = np.array([row.circle if row else (np.nan,) * 3 for row in rows], dtype=np.float64)
     else:
         polygons = tuple(tuple(frozen(p) for p in polygons_of(row)) if row else () for row in rows)
-    vertices = _rigid_outline(rectangles) if rectangles is not None else None
+    vertices = rigid_outline(rectangles) if rectangles is not None else None
     if vertices is None:
         vertices = _outline_rows(rows)
     states = np.array([row.state if row else (np.nan,) * 4 for row in rows], dtype=np.float64)

@@ -1,0 +1,106 @@
+"""The last cycle's repair, seen from this one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.check.verdict import Verdict
+from repair.curves.base import Curve, FrenetTrajectory
+from repair.preparation import Prepared
+from repair.scene.frame import FrenetFrame
+from repair.timegrid import INSTANT, on_grid
+
+__all__ = ["KeptRepair", "Later", "verified_again"]
+
+_PLACE_OFF, _SPEED_OFF = (
+    0.02,
+    0.1,
+)  # at the seam: further off the new reference [m], [m/s] it is another drive
+
+
+@dataclass(frozen=True)
+class Later:
+    """A curve seen from a later zero of time.
+
+    Attributes
+    ----------
+    curve : Curve
+    by : float
+        So much later [s].
+    """
+
+    curve: Curve
+    by: float
+
+    @property
+    def t_start(self) -> float:
+        """Start of the span [s]; may be negative."""
+        return self.curve.t_start - self.by
+
+    @property
+    def t_end(self) -> float:
+        """End of the span [s]."""
+        return self.curve.t_end - self.by
+
+    def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
+        """Evaluate; outside of the span the curve is extended from its end state."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        return replace(self.curve.sample(times + self.by), t=times)
+
+
+@dataclass(frozen=True)
+class KeptRepair:
+    """A verified repair, with the time at which it was found.
+
+    Attributes
+    ----------
+    curve : Curve
+        From ``f_ttr`` on, in ``frame``.
+    f_ttr : float
+        [s] after ``now``.
+    now : float
+        [s].
+    frame : FrenetFrame
+    """
+
+    curve: Curve
+    f_ttr: float
+    now: float
+    frame: FrenetFrame
+
+
+def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[float, Curve] | None:
+    """The kept repair among the traffic as it is now: until when it can be waited, and what is driven then.
+
+    Parameters
+    ----------
+    kept : KeptRepair
+    prepared : Prepared
+        The cycle.
+    now : float
+        When the cycle begins [s].
+
+    Returns
+    -------
+    (f_ttr, curve) or None
+        None where the frame is another one, the reference does not lead to it any more, or the checker
+        rejects it.
+    """
+    if kept.frame is not prepared.scene.frame:
+        return None
+    curve = Later(kept.curve, now - kept.now)
+    t_rep = on_grid(max(kept.f_ttr - (now - kept.now), 0.0), prepared.scene.dt)
+    if t_rep >= min(prepared.conflict.time, curve.t_end) - INSTANT:
+        return None
+    here, there = (c.sample([t_rep]) for c in (prepared.reference, curve))
+    apart = np.abs(here.position - there.position).max()
+    if apart > _PLACE_OFF or np.abs(here.velocity - there.velocity).max() > _SPEED_OFF:
+        return None
+    problems = prepared.source.at(t_rep)
+    if not problems:
+        return None
+    verdict: Verdict = prepared.checker.check(problems[0], curve)
+    return (t_rep, curve) if verdict.ok else None

@@ -1,0 +1,335 @@
+"""A repair every cycle: the road is laid out once, and only what has changed is laid out again.
+
+>>> watch = repair.Repairer("DEU_Flensburg-6_1_T-1.xml", backend="ego")          # doctest: +SKIP
+>>> cycle = watch.update(plan, now=0.3, deadline=0.02)                            # doctest: +SKIP
+>>> cycle.f_ttr, cycle.complete                                                   # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from repair.api import RepairResult, find, make
+from repair.arrays import Array, frozen
+from repair.backend.base import RepairBackend
+from repair.check.checker import Checker
+from repair.config.load import load_config
+from repair.config.schema import Config
+from repair.curves.base import Curve, SplicedCurve
+from repair.cycle.cycle import Cycle
+from repair.cycle.ego import ego_of
+from repair.cycle.kept import KeptRepair, verified_again
+from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError, in_words, kind_of
+from repair.outcome.data import Outcome
+from repair.preparation import Phases, Prepared, laid_out
+from repair.reference.given import GivenReference, given_reference
+from repair.scene.commonroad import load_scene, moved_on
+from repair.scene.reframe import reframe
+from repair.scene.road.lanes import Lane, lanes_of
+from repair.scene.scene import InitialState, Scene
+from repair.scene.traffic.given_rows import given_obstacles
+from repair.scene.traffic.obstacle import Obstacle, later
+from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.settings import SearchConfig
+from repair.timegrid import INSTANT, steps_until
+from repair.vehicle.commonroad_ks import load_official
+
+__all__ = ["Cycle", "Repairer"]
+
+_BESIDE = 0.2  # a plan further beside the kept frame's path gets one of its own [m]; smoothing takes 0.1
+_AHEAD = 20.0  # so much of the frame has to be left beyond the plan [m]
+_LEAST = 3  # steps of a horizon
+_HORIZON = 10.0  # unless ``scene.horizon`` says another [s]
+
+
+class Repairer:
+    """Built once for a road, asked every cycle.
+
+    What it keeps is its own: several of them, in several threads, do not meet. It can be pickled.
+
+    Parameters
+    ----------
+    road : Scene, path, or CommonRoad scenario
+        Where it is driven, with a planning problem: its goal says which way the road goes on.
+    config : Config, optional
+        See :func:`repair.load_config`; ``reference`` in it is not looked at.
+    planning_problem : optional
+        With a CommonRoad scenario: the planning problem.
+    **keys
+        Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
+
+    Raises
+    ------
+    RepairError
+        If road or configuration cannot be used.
+    """
+
+    def __init__(
+        self, road: Any, config: Config | None = None, *, planning_problem: Any = None, **keys: Any
+    ) -> None:
+        if config is not None and keys:
+            raise ConfigError("give either a config or configuration keys, not both")
+        config = load_config(**keys) if config is None else config
+        if not isinstance(config, Config):
+            raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
+        if config.driver != "f_ttr":
+            raise ConfigError(f"a Repairer searches for the F-TTR; driver={config.driver} has no effect here")
+        source = replace(config, reference=replace(config.reference, source="given"))
+        source.given = config.given - {"reference.source"}
+        self.config = source
+        self.scene = _scene_of(road, planning_problem, config)
+        self._first = self.scene
+        self._start()
+        self._made()
+
+    def _start(self) -> None:
+        """What is made on the way."""
+        self._lanes: Mapping[int, Lane] | None = None
+        self._backend: RepairBackend | None = None
+        self._framed: Scene | None = None
+        self._room = 0.0
+        self._checker: Checker | None = None
+        self._kept: KeptRepair | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"config": self.config, "scene": self.scene, "_first": self._first}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._start()
+
+    def reset(self) -> None:
+        """Forget what was found: the next cycle is a first one."""
+        self._kept = None
+
+    def update(
+        self,
+        reference: Any,
+        *,
+        traffic: Iterable[Any] | None = None,
+        ego: Any = None,
+        now: float = 0.0,
+        deadline: float | None = None,
+    ) -> Cycle:
+        """Repair the plan of this cycle.
+
+        Parameters
+        ----------
+        reference : array, mapping, trajectory or result
+            The plan from ``now`` on, its times beginning with 0; see
+            :func:`repair.reference.given.given_reference`. Curves are not taken, as the frame may change.
+        traffic : iterable, optional
+            All others, from ``now`` on: CommonRoad obstacles (their time steps being those of the scenario),
+            or :class:`repair.Prediction`. By default the scenario's own traffic.
+        ego : InitialState, mapping or CommonRoad state, optional
+            The ego's state now: ``x, y`` [m], ``yaw`` [rad], ``v`` [m/s], if known ``a`` [m/s²] and
+            ``yaw_rate`` [rad/s]. By default where the plan begins.
+        now : float
+            [s] since the planning problem's start; a multiple of the scenario's step.
+        deadline : float, optional
+            The answer is there within so many seconds from the call on: the best that was verified by then,
+            in this cycle or an earlier one.
+
+        Returns
+        -------
+        Cycle
+
+        Raises
+        ------
+        RepairError
+            If something cannot be used; what was kept stays as it was.
+        """
+        begin = time.perf_counter()
+        if deadline is not None:
+            if not (isinstance(deadline, int | float) and deadline > 0.0):
+                raise ConfigError(f"the deadline is {in_words(deadline)}; it has to be positive [s]")
+            load_official()
+        if isinstance(reference, RepairResult | Cycle):
+            reference = reference.states
+        elif isinstance(reference, Outcome):
+            reference = reference.driven()
+        if isinstance(reference, Curve):
+            raise ReferenceTrajectoryError("a Repairer takes places on the plane, and not a curve in a frame")
+        step = self._step(now)
+        state = ego_of(ego, reference, self.scene)
+        rebuilt: list[str] = []
+        scene = self._now(step, state, traffic)
+        given = given_reference(reference, scene)
+        scene, checker = self._frame(scene, given, rebuilt)
+        prepared = laid_out(scene, self.config, given, Phases(), like=checker)
+        self._checker = prepared.checker
+        kept = None if self._kept is None else verified_again(self._kept, prepared, now)
+        settings = self.config.search
+        if deadline is not None:
+            left = max(deadline - (time.perf_counter() - begin) - _spare(deadline), 1e-6)
+            settings = replace(settings, time_limit=min(left, settings.time_limit or left))
+        found = _searched(prepared, self._made(), settings, None if kept is None else kept[0])
+        return self._answer(now, prepared, found, kept, tuple(rebuilt), begin)
+
+    # -- parts of a cycle --------------------------------------------------------------------------------
+
+    def _made(self) -> RepairBackend:
+        if self._backend is None:
+            self._backend = make(self.config)
+        return self._backend
+
+    def _step(self, now: float) -> int:
+        if not (isinstance(now, int | float) and np.isfinite(now) and now >= 0.0):
+            raise ConfigError(
+                f"now is {in_words(now)}; it is a time from the planning problem's start on [s]"
+            )
+        step = round(now / self.scene.dt)
+        if abs(step * self.scene.dt - now) > INSTANT * max(1.0, now):
+            raise ConfigError(f"now is {now:g} s; it has to be a multiple of the step of {self.scene.dt:g} s")
+        return step
+
+    def _now(self, step: int, ego: InitialState, traffic: Iterable[Any] | None) -> Scene:
+        """The scene of the cycle, on the road's own frame."""
+        base = self.scene
+        first = self._first.initial_time_step + step
+        notes: list[str] = []
+        if traffic is None:
+            obstacles: tuple[Obstacle, ...] = tuple(
+                o for o in (later(o, step) for o in self._first.obstacles) if o is not None
+            )
+            n_steps = self._first.n_steps - step
+            if n_steps < _LEAST:
+                end = self._first.horizon
+                raise ScenarioError(
+                    f"the scenario's own traffic ends at {end:g} s, and now is {step * base.dt:g} s"
+                )
+        else:
+            obstacles, n_steps, notes = given_obstacles(
+                base.scenario, first, traffic,
+                after_prediction=base.settings.after_prediction,
+                steps_max=steps_until(base.settings.horizon or _HORIZON, base.dt),
+            )  # fmt: skip
+        start = frozen([base.start[0], [ego.velocity, 0.0], [ego.acceleration, 0.0]])
+        return replace(
+            base, initial_state=ego, start=start, obstacles=obstacles, n_steps=n_steps,
+            horizon=n_steps * base.dt, initial_time_step=first, recorded_ego=None, notes=tuple(notes),
+        )  # fmt: skip
+
+    def _frame(self, scene: Scene, given: GivenReference, rebuilt: list[str]) -> tuple[Scene, Checker | None]:
+        """The scene in a frame along the plan: the kept one where the plan is on its path, else a new one."""
+        positions = given.positions
+        assert positions is not None
+        kept = self._framed
+        if kept is not None:
+            places = kept.frame.to_frenet(positions)
+            if _fits(places, kept.frame.length, self._room):
+                return _in(kept, scene, places[0]), self._checker
+            rebuilt.append("frame: the plan leaves the path of the last one")
+        if not self._within(positions):
+            self.scene = moved_on(self._first, scene.initial_state)
+            self._lanes = None
+            rebuilt.append("road: the plan leaves the one that was laid out")
+            scene = replace(
+                scene, frame=self.scene.frame, route_lanelets=self.scene.route_lanelets,
+                lane=self.scene.lane, same_direction=self.scene.same_direction, road=self.scene.road,
+            )  # fmt: skip
+        if self._lanes is None:
+            self._lanes, _ = lanes_of(scene.scenario.lanelet_network)
+        made = reframe(scene, positions, self._lanes)
+        self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
+        self._framed, self._kept = made, None
+        return made, self._checker
+
+    def _within(self, positions: Array) -> bool:
+        """Whether the plan ends near the road that is laid out, and not at its end."""
+        place = self.scene.frame.to_frenet(positions[-1:])[0]
+        return bool(np.isfinite(place).all() and place[0] < self.scene.frame.length - _AHEAD)
+
+    def _answer(
+        self, now: float, prepared: Prepared, found: SearchResult, kept: tuple[float, Curve] | None,
+        rebuilt: tuple[str, ...], begin: float,
+    ) -> Cycle:  # fmt: skip
+        f_ttr, part = found.f_ttr, found.curve
+        conflicting = found.status not in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING)
+        is_kept = kept is not None and conflicting and (f_ttr is None or kept[0] > f_ttr + INSTANT)
+        if is_kept and kept is not None:
+            f_ttr, part = kept
+        curve: Curve = prepared.reference
+        if part is not None and f_ttr is not None:
+            curve = SplicedCurve(prepared.reference, part, f_ttr)
+            self._kept = KeptRepair(part, f_ttr, now, prepared.scene.frame)
+        elif found.status is not SearchStatus.NO_CONFLICT:
+            self._kept = None
+        return Cycle(
+            now, prepared, found, f_ttr, curve, is_kept, found.complete, rebuilt,
+            time.perf_counter() - begin,
+        )  # fmt: skip
+
+
+def _searched(
+    prepared: Prepared, backend: RepairBackend, settings: SearchConfig, kept: float | None
+) -> SearchResult:
+    """The search; where a repair is kept, only for later ones, from one point of the grid to the next."""
+    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
+    if kept is None or not np.isfinite(end):
+        return find(prepared, backend, settings=settings)
+    begin, found = time.perf_counter(), None
+    probes: tuple[Probe, ...] = ()
+    t_rep = settings.delta_t * (np.floor(kept / settings.delta_t + INSTANT) + 1.0)
+    while t_rep < end - INSTANT:
+        if settings.time_limit is not None:
+            left = settings.time_limit - (time.perf_counter() - begin)
+            settings = replace(settings, time_limit=max(left, 0.0))
+        found = find(prepared, backend, settings=settings, visits=(float(t_rep),))
+        probes += found.probes
+        if found.f_ttr is None or not found.complete:
+            break
+        t_rep += settings.delta_t
+    spent = time.perf_counter() - begin
+    best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
+    complete = found is None or found.complete
+    if best is None:
+        return SearchResult(
+            SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED,
+            prepared.conflict, None, None, probes, complete, spent,
+        )  # fmt: skip
+    return SearchResult(
+        SearchStatus.FOUND, prepared.conflict, best.t_rep, best.solve.curve, probes, complete, spent
+    )
+
+
+def _scene_of(road: Any, planning_problem: Any, config: Config) -> Scene:
+    from repair.scene.commonroad import scene_from_scenario
+
+    if isinstance(road, Scene):
+        return road
+    if hasattr(road, "lanelet_network"):
+        return scene_from_scenario(road, planning_problem, config)
+    if not isinstance(road, str | Path):
+        raise ScenarioError(f"a road is a scene, a path or a CommonRoad scenario, not {kind_of(road)}")
+    return load_scene(road, config)
+
+
+def _spare(deadline: float) -> float:
+    """What is left for making the answer of what was found [s]."""
+    return min(5e-4, 0.1 * deadline)
+
+
+def _fits(places: Array, length: float, room: float) -> bool:
+    """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have."""
+    return bool(
+        np.isfinite(places).all()
+        and np.abs(places[:, 1]).max() <= _BESIDE
+        and places[0, 0] > 1.0
+        and places[-1, 0] <= length - room + INSTANT
+    )
+
+
+def _in(kept: Scene, scene: Scene, place: Array) -> Scene:
+    """The scene of this cycle in the frame of another one."""
+    start = frozen([place, scene.start[1], scene.start[2]])
+    return replace(
+        scene, frame=kept.frame, start=start, route_end_s=kept.route_end_s, goal_s=kept.goal_s,
+        lane=kept.lane, same_direction=kept.same_direction, road=kept.road, speed_limit=kept.speed_limit,
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""Predictions from memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from repair.errors import ScenarioError, foreign
+
+__all__ = ["WHAT", "Mode", "Prediction", "name_of", "predictions_of", "size_of"]
+
+WHAT = "the given traffic"
+"""Its name in sentences."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Where an obstacle will be, as one mode of a prediction has it.
+
+    Attributes
+    ----------
+    id : int
+        Positive. Several predictions with one id are modes of that obstacle.
+    poses : (T, 3) array or None
+        ``x, y`` [m] and ``yaw`` [rad] of the obstacle's centre at the scenario's steps from the planning
+        problem's start on; rows of NaN at the beginning or the end where it is not there.
+    length, width : float
+        Of its rectangle [m].
+    occupancies : sequence of (V, 2) array, or None
+        Instead of poses: the set in which it is from step to step, a polygon [m] for each.
+    kind : str
+        CommonRoad obstacle type, such as ``car``.
+    probability : float
+        Of this mode.
+    mode : str
+        Its name.
+    """
+
+    id: int
+    poses: Any = None
+    length: float | None = None
+    width: float | None = None
+    occupancies: Sequence[Any] | None = None
+    kind: str = "car"
+    probability: float = 1.0
+    mode: str = ""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One of several predictions of an obstacle, and the id under which it is among the traffic."""
+
+    obstacle_id: int
+    name: str
+    probability: float
+    stands_as: int
+
+
+def predictions_of(
+    boxes: Any, *, length: Any = None, width: Any = None, ids: Sequence[int] | None = None, kind: str = "car"
+) -> list[Prediction]:
+    """Predictions of many obstacles from one array.
+
+    Parameters
+    ----------
+    boxes : (N, T, 3) or (N, T, 5) array
+        ``x, y, yaw`` of the centres at the scenario's steps, and with five columns ``length, width`` too
+        (constant over time); NaN where an obstacle is not there.
+    length, width : float or (N,) array
+        [m], where the array has three columns.
+    ids : sequence of int, optional
+        1, 2, ... by default.
+    kind : str
+        CommonRoad obstacle type.
+
+    Raises
+    ------
+    ScenarioError
+        If the shapes do not fit.
+    """
+    with foreign(WHAT, ScenarioError):
+        table = np.asarray(boxes, dtype=np.float64)
+    if table.ndim != 3 or table.shape[2] not in (3, 5):
+        raise ScenarioError(f"{WHAT} is of shape {table.shape}; boxes are (N, T, 3) or (N, T, 5)")
+    count = len(table)
+    names = list(range(1, count + 1)) if ids is None else [int(i) for i in ids]
+    if len(names) != count:
+        raise ScenarioError(f"{WHAT} has {count} obstacles and {len(names)} ids")
+    if table.shape[2] == 5:
+        if length is not None or width is not None:
+            raise ScenarioError(f"{WHAT} holds its sizes; leave length and width out")
+        sizes = table[:, :, 3:]
+        if count and float(np.nanmax(np.nanmax(sizes, axis=1) - np.nanmin(sizes, axis=1))) > 1e-9:
+            raise ScenarioError(
+                f"{WHAT}: the size of an obstacle changes over time; give occupancies instead"
+            )
+        size = np.nanmax(sizes, axis=1) if count else np.zeros((0, 2))
+    else:
+        if length is None or width is None:
+            raise ScenarioError(f"{WHAT} is of shape {table.shape}; it takes length and width as well")
+        try:
+            size = np.stack(
+                [np.broadcast_to(np.asarray(v, dtype=np.float64), count) for v in (length, width)], 1
+            )
+        except ValueError as error:
+            raise ScenarioError(f"{WHAT}: length and width do not fit {count} obstacles") from error
+    return [
+        Prediction(name, rows[:, :3], float(a), float(b), kind=kind)
+        for name, rows, (a, b) in zip(names, table, size, strict=True)
+    ]
+
+
+def name_of(prediction: Prediction) -> str:
+    """What a prediction is called in sentences."""
+    named = f", {prediction.mode}" if prediction.mode else ""
+    return f"prediction of obstacle {prediction.id}{named}"
+
+
+def size_of(prediction: Prediction) -> tuple[float, float]:
+    """Length and width of a prediction's rectangle [m].
+
+    Raises
+    ------
+    ScenarioError
+        If one of them is not positive.
+    """
+    length, width = prediction.length, prediction.width
+    if not all(v is not None and np.isfinite(v) and v > 0.0 for v in (length, width)):
+        raise ScenarioError(
+            f"{name_of(prediction)}: length and width are {length!r} and {width!r}; both have to be positive"
+        )
+    return float(length or 0.0), float(width or 0.0)

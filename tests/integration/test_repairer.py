@@ -1,0 +1,235 @@
+"""The door for planners: a repair every cycle."""
+
+from __future__ import annotations
+
+import pickle
+import re
+import time
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from tests import roads
+
+import repair
+from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError, ScenarioError
+
+DOCS = Path(__file__).parents[2] / "docs" / "planner.md"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """Return a straight road with a slower car ahead."""
+    file = tmp_path_factory.mktemp("road") / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(roads.scenario(), encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return repair.load_scene(file)
+
+
+def plan(scene, now=0.0, aside=0.0, duration=4.0):
+    """Straight on at the initial speed, from where that leads to at ``now``; possibly beside it."""
+    ego = scene.initial_state
+    t = np.arange(0.0, duration + 1e-9, scene.dt)
+    axis = np.array([np.cos(ego.orientation), np.sin(ego.orientation)])
+    place = np.array([ego.x, ego.y]) + (ego.velocity * (now + t))[:, None] * axis
+    place += aside * np.array([-axis[1], axis[0]])
+    return np.column_stack([t, place, np.full(len(t), ego.orientation), np.full(len(t), ego.velocity)])
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
+def test_the_first_cycle_is_a_repair(scene, backend):
+    whole = repair.repair(scene, reference=plan(scene), backend=backend)
+    cycle = repair.Repairer(scene, backend=backend).update(plan(scene))
+    assert cycle.f_ttr == whole.f_ttr
+    assert cycle.ttc == whole.ttc
+    assert cycle.complete
+    assert not cycle.kept
+    assert not cycle.rebuilt
+    np.testing.assert_allclose(cycle.states.x, whole.states.x, atol=1e-9)
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
+def test_the_time_left_runs_down_and_never_jumps_back(scene, backend):
+    """The plan and the recording stay as they are: what was verified once is so until it is due."""
+    watch = repair.Repairer(scene, backend=backend)
+    until, kept = 0.0, 0
+    for k in range(12):
+        now = k * scene.dt
+        cycle = watch.update(plan(scene, now), now=now)
+        assert cycle.status == "found"
+        assert not cycle.rebuilt
+        assert now + cycle.f_ttr >= until - 1e-9
+        until, kept = now + cycle.f_ttr, kept + cycle.kept
+        assert until < now + cycle.ttc
+    assert kept > 0
+
+
+def test_what_is_driven_touches_nothing(scene):
+    """By shapely, against the recorded rectangles, at each step of each cycle."""
+    watch = repair.Repairer(scene, backend="ego")
+    vehicle = scene.vehicle
+    for k in range(0, 12, 3):
+        now = k * scene.dt
+        states = watch.update(plan(scene, now), now=now).states
+        for j in range(len(states)):
+            ego = box(
+                states.x[j], states.y[j], states.orientation[j], vehicle.half_length, vehicle.half_width
+            )
+            for other in scene.obstacles:
+                if k + j <= other.n_steps:
+                    assert not ego.intersects(box(*other.rectangles[k + j]))
+
+
+def box(x, y, turn, half_length, half_width):
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (half_length, half_width)
+    c, s = np.cos(turn), np.sin(turn)
+    return shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + (x, y))
+
+
+def test_recorded_traffic_and_predictions_of_it_are_the_same(scene):
+    one, other = repair.Repairer(scene), repair.Repairer(scene)
+    for k in range(0, 8, 2):
+        now = k * scene.dt
+        predictions = [
+            repair.Prediction(o.id, o.states[k:, :3], *(2.0 * o.rectangles[0, 3:])) for o in scene.obstacles
+        ]
+        a = one.update(plan(scene, now), now=now)
+        b = other.update(plan(scene, now), traffic=predictions, now=now)
+        assert a.f_ttr == b.f_ttr
+        assert a.conflict.contact_time == pytest.approx(b.conflict.contact_time, abs=2e-3)
+
+
+def test_commonroad_obstacles_are_taken_by_their_time_steps(scene):
+    one, other = repair.Repairer(scene), repair.Repairer(scene)
+    a = one.update(plan(scene, 0.5), now=0.5)
+    b = other.update(plan(scene, 0.5), traffic=scene.scenario.obstacles, now=0.5)
+    assert a.f_ttr == b.f_ttr
+
+
+def test_a_kept_repair_is_given_up_when_the_traffic_changes(scene):
+    watch = repair.Repairer(scene, backend="casadi")
+    assert watch.update(plan(scene), now=0.0).status == "found"
+    clear = watch.update(plan(scene, 0.1), traffic=[], now=0.1)
+    assert clear.status == "no_conflict"
+    assert clear.f_ttr == np.inf
+    ego = scene.initial_state
+    ahead = np.array([ego.x, ego.y]) + 9.0 * np.array([np.cos(ego.orientation), np.sin(ego.orientation)])
+    wall = repair.Prediction(5, np.tile([*ahead, ego.orientation], (40, 1)), 2.0, 30.0)
+    none = watch.update(plan(scene, 0.2), traffic=[wall], now=0.2)
+    assert none.status == "none_feasible"
+    assert none.f_ttr is None
+    assert not none.kept
+
+
+def test_a_plan_elsewhere_gets_a_frame_of_its_own(scene):
+    watch = repair.Repairer(scene)
+    watch.update(plan(scene))
+    cycle = watch.update(plan(scene, 0.1, aside=1.0), now=0.1)
+    assert any(word.startswith("frame") for word in cycle.rebuilt)
+    assert not cycle.kept
+    assert not watch.update(plan(scene, 0.2, aside=1.0), now=0.2).rebuilt
+
+
+def test_without_speeds_the_plan_says_them_by_its_places(scene):
+    cycle = repair.Repairer(scene).update(plan(scene)[:, :3])
+    assert cycle.prepared.scene.initial_state.velocity == pytest.approx(
+        scene.initial_state.velocity, abs=1e-6
+    )
+    assert cycle.status == "found"
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
+def test_a_deadline_holds_and_what_was_kept_counts(scene, backend):
+    watch = repair.Repairer(scene, backend=backend)
+    assert watch.update(plan(scene)).complete
+    late = []
+    for k in range(1, 8):
+        now, begin = k * scene.dt, time.process_time()
+        cycle = watch.update(plan(scene, now), now=now, deadline=0.01)
+        late.append(time.process_time() - begin - 0.01)
+        assert cycle.status == "found"
+    assert np.median(late) < 0.02
+
+
+def test_threads_do_not_meet(scene):
+    def drive(backend):
+        watch = repair.Repairer(scene, backend=backend)
+        return [watch.update(plan(scene, k * scene.dt), now=k * scene.dt).f_ttr for k in range(5)]
+
+    alone = [drive("ego"), drive("qptr")]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(drive, ["ego", "qptr", "ego", "qptr"]))
+    assert together == [*alone, *alone]
+
+
+def test_it_can_be_pickled(scene):
+    watch = repair.Repairer(scene)
+    watch.update(plan(scene))
+    again = pickle.loads(pickle.dumps(watch))
+    fresh = repair.Repairer(scene)
+    assert again.update(plan(scene, 0.1), now=0.1).f_ttr == fresh.update(plan(scene, 0.1), now=0.1).f_ttr
+
+
+WRONG = {
+    "between steps": (lambda s: {"now": 0.05}, ConfigError, "multiple of the step"),
+    "before": (lambda s: {"now": -0.1}, ConfigError, "now is -0.1"),
+    "no time": (lambda s: {"now": "soon"}, ConfigError, "'soon'"),
+    "too late": (lambda s: {"now": 50.0, "ego": None}, ScenarioError, "traffic ends at"),
+    "no deadline": (lambda s: {"deadline": 0.0}, ConfigError, "the deadline is 0.0"),
+    "no ego": (lambda s: {"ego": 5}, ScenarioError, "not a int"),
+    "half an ego": (lambda s: {"ego": {"x": 0.0, "y": 0.0, "yaw": 0.0}}, ScenarioError, "lacks v"),
+    "another ego": (
+        lambda s: {"ego": {"x": 1e3, "y": 0.0, "yaw": 0.0, "v": 0.0}}, ReferenceTrajectoryError, "starts"
+    ),
+    "an ego that is none": (
+        lambda s: {"ego": {"x": np.nan, "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "not finite"
+    ),
+    "a letter": (lambda s: {"ego": {"x": "a", "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "no number"),
+    "traffic": (lambda s: {"traffic": 5}, ScenarioError, "has to be a list"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_is_a_sentence_and_no_end(what, scene):
+    keys, error, words = WRONG[what]
+    watch = repair.Repairer(scene)
+    with pytest.raises(error, match=words):
+        watch.update(plan(scene), **keys(scene))
+    assert watch.update(plan(scene)).status == "found"
+
+
+@pytest.mark.parametrize(
+    "road, keys, words",
+    [
+        (5, {}, "not a int"),
+        ("nowhere.xml", {}, "no such file"),
+        (None, {"backend": "foo"}, "foo"),
+        (None, {"overrides": ["driver=at_ttr"]}, "driver=at_ttr"),
+    ],
+)
+def test_what_no_repairer_is_made_of(road, keys, words, scene):
+    with pytest.raises(RepairError, match=words):
+        repair.Repairer(scene if road is None else road, **keys)
+
+
+def test_a_curve_is_no_plan(scene):
+    planned = repair.repair(scene, overrides=["reference.source=planner"]).prepared.reference
+    with pytest.raises(ReferenceTrajectoryError, match="places on the plane"):
+        repair.Repairer(scene).update(planned)
+
+
+def test_the_loop_of_the_page(scenarios, monkeypatch):
+    """It drives the crossing of the paper with a planner of its own, and touches nothing."""
+    code = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL).group(1)
+    assert len(code.splitlines()) <= 40
+    code = code.replace("scenarios/DEU_Flensburg-6_1_T-1.xml", str(scenarios / "DEU_Flensburg-6_1_T-1.xml"))
+    names = {}
+    exec(compile(code, str(DOCS), "exec"), names)
+    assert names["evading"] is not None
+    assert len(names["driven"]) == 45
+    steps = np.hypot(*np.diff(np.array(names["driven"]), axis=0).T)
+    assert steps.max() < 14.0 * names["dt"]
