@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         SolveResult,
         SolveStatus,
     )
+    from repair.bounds.latest import Bound, bound
     from repair.check.registry import register as register_check
     from repair.check.verdict import Conflict, Reason, Verdict
     from repair.config import Config, load_config, preset_names
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BackendError",
     "BackendSpec",
+    "Bound",
     "Capabilities",
     "Closest",
     "Config",
@@ -93,6 +95,7 @@ __all__ = [
     "__version__",
     "available_backends",
     "backend_names",
+    "bound",
     "load_config",
     "load_result",
     "load_scene",
@@ -115,6 +118,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.backend.base": (
         "BackendSpec", "Capabilities", "Closest", "RepairBackend", "SolveResult", "SolveStatus",
     ),
+    "repair.bounds.latest": ("Bound", "bound"),
     "repair.check.verdict": ("Conflict", "Reason", "Verdict"),
     "repair.config": ("Config", "load_config", "preset_names"),
     "repair.curves.base": ("FrenetTrajectory",),

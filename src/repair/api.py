@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from repair.backend.base import Capabilities, RepairBackend
 from repair.backend.guard import Guarded
 from repair.baselines.evasive.at_ttr import AtTtr
+from repair.bounds.latest import Bound, bound
 from repair.check.peaks import Peaks
 from repair.config.load import load_config
 from repair.config.schema import Config, require_types
@@ -64,6 +65,8 @@ class RepairResult:
         What each mode alone would allow, of obstacles that were given several predictions.
     capabilities : Capabilities
         Of the backend.
+    bounds : dict
+        From when on it is proven too late, by kind; empty where it was not asked for (``bound.wanted``).
     """
 
     prepared: Prepared
@@ -74,6 +77,7 @@ class RepairResult:
     metrics: dict[str, MetricValue] = field(default_factory=dict)
     capabilities: Capabilities = field(default_factory=Capabilities)
     modes: tuple[ModeResult, ...] = ()
+    bounds: dict[str, Bound] = field(default_factory=dict)
 
     @property
     def status(self) -> SearchStatus:
@@ -110,7 +114,7 @@ class RepairResult:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
             self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
-            self.modes,
+            self.modes, self.bounds,
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
@@ -129,7 +133,7 @@ class RepairResult:
         """Write the result into a folder; its outcome with the names of the files, and their paths."""
         target = path_of(folder, "the folder of a result", OutputError)
         require_folder(target)
-        made = Saved(self.outcome, self.prepared.scene, self.states, self.status, figure)
+        made = Saved(self.outcome, self.prepared.scene, self.states, self.status, figure, self.bounds)
         return saved(made, target)
 
     def save(self, folder: str | Path, *, figure: bool = True) -> list[Path]:
@@ -262,7 +266,13 @@ def search(
                 prepared.scene.modes, prepared.scene.obstacles, found,
                 lambda traffic: find(among(prepared, traffic), backend),
             )  # fmt: skip
-    return RepairResult(prepared, found, states, reached, timed.seconds, metrics, backend.capabilities, modes)
+    bounds: dict[str, Bound] = {}
+    if config.bound.wanted:
+        with timed("bound"):
+            bounds = bound(prepared, config.bound)
+    return RepairResult(
+        prepared, found, states, reached, timed.seconds, metrics, backend.capabilities, modes, bounds
+    )
 
 
 def find(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from repair.bounds.latest import Bound
 from repair.errors import OutputError, foreign
 from repair.io.commonroad import no_solution_because, scenario_bytes, to_solution
 from repair.io.files import write_files
@@ -37,6 +38,8 @@ class Saved:
     status : SearchStatus
     figures : bool
         Whether figures are wanted.
+    bounds : mapping
+        From when on it is proven too late, by kind.
     """
 
     outcome: Outcome
@@ -44,6 +47,7 @@ class Saved:
     states: DrivenStates
     status: SearchStatus
     figures: bool
+    bounds: Mapping[str, Bound] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

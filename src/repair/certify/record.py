@@ -21,7 +21,7 @@ __all__ = ["Again", "differences", "record_rows", "searched_again"]
 _FREE = frozenset(
     {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
      "scenario_file_problem", "modes", "drawing_file", "provenance",
-     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations"}
+     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound"}
 )  # fmt: skip
 #: What follows from the scenario, the configuration and the curve alone.
 _DIRECT = (

@@ -32,12 +32,17 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", type=Path, help="write result.json, the solution file and figures"
     )
     parser.add_argument("--json", action="store_true", help="print what result.json holds, and nothing else")
+    parser.add_argument(
+        "--bound", action="store_true", help="prove from when on nothing avoids the conflict any more"
+    )
     parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
 
 
 @contextmanager
 def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
     """The scenario's file and the configuration; the paper's scenarios come with their presets."""
+    if arguments.bound:
+        arguments.overrides = [*arguments.overrides, "bound.wanted=true"]
     config = resolve(arguments)
     name = arguments.scenario or config.scenario
     default = arguments.preset if arguments.preset in PAPER_SCENARIOS else PAPER_SCENARIOS[0]

@@ -8,6 +8,7 @@ from functools import lru_cache, reduce
 from typing import Any
 
 from repair.baselines.evasive.settings import EvasiveConfig
+from repair.bounds.settings import BoundConfig
 from repair.check.registry import CHECKS
 from repair.check.settings import CheckerConfig
 from repair.errors import BackendError, ConfigError, in_words
@@ -50,6 +51,7 @@ class Config:
     repair: RepairConfig = field(default_factory=RepairConfig)
     evasive: EvasiveConfig = field(default_factory=EvasiveConfig)
     checker: CheckerConfig = field(default_factory=CheckerConfig)
+    bound: BoundConfig = field(default_factory=BoundConfig)
     for_backend: dict[str, Any] = setting(
         factory=dict, says="keys that count where a backend is used, by its name"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from repair.backend.base import Capabilities
+from repair.bounds.latest import Bound
 from repair.check.peaks import Peaks
 from repair.metrics.base import MetricValue
 from repair.outcome.data import Outcome
@@ -27,7 +28,8 @@ def outcome_of(
     metrics: Mapping[str, MetricValue],
     capabilities: Capabilities,
     modes: Sequence[ModeResult] = (),
+    bounds: Mapping[str, Bound] | None = None,
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
-    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes)
+    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds)
     return Outcome(record, drawing_of(prepared, found, states))

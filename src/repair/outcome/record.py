@@ -12,11 +12,13 @@ import numpy as np
 
 from repair.arrays import column, number
 from repair.backend.base import Capabilities, SolveResult
+from repair.bounds.latest import Bound
 from repair.check.beyond import Beyond, met_beyond
 from repair.check.peaks import Peaks
 from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
+from repair.outcome.bound_record import bound_to_dict
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
@@ -42,6 +44,7 @@ def record_of(
     metrics: Mapping[str, MetricValue],
     capabilities: Capabilities,
     modes: Sequence[ModeResult] = (),
+    bounds: Mapping[str, Bound] | None = None,
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -61,6 +64,8 @@ def record_of(
         Of the backend.
     modes : sequence of ModeResult
         What each of several predictions of an obstacle alone would allow.
+    bounds : mapping, optional
+        From when on it is proven too late, by kind.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -93,6 +98,7 @@ def record_of(
             "detail": str(getattr(conflict, "detail", "")),
             "place_m": _place(conflict.place),
         },
+        "bound": bound_to_dict(prepared, found, bounds or {}),
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "modes": [_mode(mode) for mode in modes],
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,

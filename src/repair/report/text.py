@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from repair.report.bound import bound_rows
 from repair.report.notes import grouped
 
 __all__ = ["fixed", "probe_table", "summary"]
@@ -49,6 +50,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
         *_decided(content),
         ("TTC", _ttc(content)),
         ("F-TTR", _f_ttr(content)),
+        *bound_rows(content),
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))

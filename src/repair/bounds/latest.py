@@ -1,0 +1,226 @@
+"""The bound: the earliest time to react that is proven too late."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.bounds.motion import Motions
+from repair.bounds.obstacles import Occupied, occupied
+from repair.bounds.settings import BoundConfig
+from repair.bounds.start import driven_within, motions_from
+from repair.bounds.tree import Attempt, attempt
+from repair.timegrid import steps_until
+
+if TYPE_CHECKING:
+    from repair.situation import Situation
+
+__all__ = ["Bound", "Proof", "bound"]
+
+_DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What proves that it is too late at a time.
+
+    Attributes
+    ----------
+    time : float
+        Of the reaction [s].
+    motions : Motions
+    instants : (I,) array
+        Since the reaction [s].
+    attempt : Attempt
+        With the tree, and the forbidden places to which it refers.
+    shapes : list of (K, 2) arrays
+        For each of these the convex obstacle (or piece of no road), seen from the start [m].
+    obstacles : list of int
+        The ids of the obstacles; -1 for what is no road.
+    """
+
+    time: float
+    motions: Motions
+    instants: Array
+    attempt: Attempt
+    shapes: list[Array]
+    obstacles: list[int]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """From when on it is too late.
+
+    Attributes
+    ----------
+    kind : str
+        For whom (:data:`repair.bounds.settings.KINDS`).
+    time : float
+        t_bound [s]: at this time and later, no motion avoids what the kind counts. Infinite where nothing
+        was proven before the conflict.
+    status : str
+        ``proven``, or why there is no proof: ``open`` (a relaxed motion meets nothing), ``nodes``, ``time``,
+        ``reference`` (the reference breaks the assumptions itself), ``no_conflict``, ``limits_off``.
+    complete : bool
+        Whether earlier times were tried until one was not proven too late for another reason than time.
+    nodes : int
+        Of all attempts.
+    seconds : float
+        Processor time.
+    proof : Proof or None
+    """
+
+    kind: str
+    time: float
+    status: str
+    complete: bool = True
+    nodes: int = 0
+    seconds: float = 0.0
+    proof: Proof | None = field(default=None, repr=False)
+
+    @property
+    def proven(self) -> bool:
+        """Whether there is a proof before the conflict."""
+        return self.proof is not None
+
+
+def bound(situation: Situation, settings: BoundConfig | None = None) -> dict[str, Bound]:
+    """Prove from when on it is too late to react.
+
+    Parameters
+    ----------
+    situation : Situation
+        What :func:`repair.prepare` returns.
+    settings : BoundConfig, optional
+        Those of the configuration by default.
+
+    Returns
+    -------
+    dict
+        A :class:`Bound` for each of ``settings.kinds``.
+    """
+    if settings is None:
+        config: Any = getattr(situation, "config", None)
+        settings = config.bound if config is not None else BoundConfig()
+    conflict = situation.conflict.time
+    if not math.isfinite(conflict) or conflict <= 0.0:
+        return {kind: Bound(kind, math.inf, "no_conflict") for kind in settings.kinds}
+    world = _World(situation, settings)
+    return {kind: _bound(kind, world, settings) for kind in settings.kinds}
+
+
+class _World:
+    """What is the same for all times to react."""
+
+    def __init__(self, situation: Situation, settings: BoundConfig) -> None:
+        scene, checker = situation.scene, situation.checker
+        self.situation, self.scene, self.checker = situation, scene, checker
+        self.substeps = checker.config.substeps
+        self.h = scene.dt / self.substeps
+        self.states = checker.drive(situation.reference, situation.t_reference)
+        contact = situation.conflict.contact_time
+        last = max(situation.conflict.time, contact if math.isfinite(contact) else 0.0) + settings.after
+        self.stop = min(steps_until(min(last, situation.t_end), self.h), scene.n_steps * self.substeps) + 1
+        self.end = min(steps_until(situation.conflict.time, self.h), len(self.states) - 1)
+        self.stride = max(1, round(settings.step / self.h))
+        start = scene.initial_state
+        near = checker.world.met_at(0, complex(start.x, start.y), start.orientation, checker.config.clearance)
+        count = scene.n_steps * self.substeps + 1
+        self.whole = occupied(scene.obstacles, count, self.substeps)
+        # the margin of who is beside the ego at the start does not count until it has been left
+        self.counted = ~np.isin(self.whole.owner, list(near)) if near else None
+
+    def shapes(self, kind: str) -> Occupied:
+        """What is met, for a kind of motions."""
+        if kind == "vehicle" or self.counted is None:
+            return self.whole
+        return Occupied(self.whole.vertices[:, self.counted], self.whole.owner[self.counted])
+
+    def instants(self, k: int) -> Array:
+        """Samples that are looked at after a reaction at a sample, which is the first of them."""
+        dense = max(1, round(_FINE / self.h))
+        coarse = max(1, round(_COARSE / self.h))
+        turn = k + dense * max(1, round(_DENSE / (dense * self.h)))
+        near = np.arange(k, min(turn, self.stop - 1) + 1, dense)
+        far = np.arange(near[-1] + coarse, self.stop, coarse)
+        return np.concatenate((near, far))
+
+
+def _bound(kind: str, world: _World, settings: BoundConfig) -> Bound:
+    if kind == "search" and not world.checker.config.limits:
+        return Bound(kind, math.inf, "limits_off")
+    begin = time.perf_counter()
+    nodes, found, why, cut = 0, None, "open", False
+
+    def late() -> bool:
+        return time.perf_counter() - begin > settings.time_limit
+
+    def proves(j: int) -> bool:
+        nonlocal nodes, found, why, cut
+        made, proof = _proof(kind, world, j * world.stride, settings.nodes, late)
+        nodes += made.nodes
+        if proof is None:
+            cut = cut or late()
+            why = (
+                "reference"
+                if not made.nodes
+                else "time"
+                if late()
+                else "nodes"
+                if made.open is None
+                else "open"
+            )
+            return False
+        found = proof
+        return True
+
+    earliest(max((world.end - 1) // world.stride, -1), proves)
+    spent = time.perf_counter() - begin
+    if found is None:
+        return Bound(kind, math.inf, why, not cut, nodes, spent)
+    return Bound(kind, found.time, "proven", not cut, nodes, spent, found)
+
+
+def earliest(last: int, proves: Callable[[int], bool]) -> int | None:
+    """The first of 0 .. ``last`` at which something is proven, as it then is later too; None if nowhere."""
+    good, bad, stride, k = last + 1, -1, 1, last
+    while k > bad:
+        if not proves(k):
+            bad = k
+            break
+        good, stride = k, 2 * stride
+        k = max(good - stride, 0) if good else -1
+    while good - bad > 1:
+        middle = (good + bad) // 2
+        if proves(middle):
+            good = middle
+        else:
+            bad = middle
+    return good if good <= last else None
+
+
+def _proof(
+    kind: str, world: _World, k: int, limit: int, late: Callable[[], bool]
+) -> tuple[Attempt, Proof | None]:
+    """An attempt at a sample of the reference, and the proof if it is one."""
+    situation = world.situation
+    vehicle = world.scene.vehicle
+    motions = motions_from(world.states, k, kind, vehicle, situation.limits, world.checker.config)
+    samples = world.instants(k)
+    if len(samples) < 2 or not driven_within(world.states, k, world.end, kind, vehicle, motions.acceleration):
+        return Attempt(False), None
+    shapes = world.shapes(kind)
+    times = (samples - k) * world.h
+    made = attempt(motions, times, shapes.vertices[samples], limit, late)
+    if not made.proven:
+        return made, None
+    used = [shapes.vertices[samples[c.instant], c.column] - motions.position for c in made.cuts]
+    owners = [int(shapes.owner[c.column]) for c in made.cuts]
+    ids = [world.scene.obstacles[o].id if o >= 0 else -1 for o in owners]
+    return made, Proof(k * world.h, motions, times, made, used, ids)

@@ -1,0 +1,197 @@
+"""What every motion of the vehicle from a start on has in common: the assumptions of a proof.
+
+A motion is any path of a reference point of the vehicle whose acceleration is never larger than A, that is
+not driven backwards, and whose body turns no faster than the steering allows. Two of them are in use
+(docs/bound.md): the rear axle, whose velocity has the direction of the body, and the body's middle, whose
+velocity is off it by the slip angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from repair.arrays import Array, wrap
+
+__all__ = ["Motions", "Turning"]
+
+_FINE = 4  # pieces of a step over which the rate of turning is bounded
+_ANGLE = 1e-7  # by how much intervals of headings are widened against rounding [rad]
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Bounds at instants (I,), that of the start included.
+
+    Attributes
+    ----------
+    low, high : (I,) array
+        Between which the heading of the body is [rad].
+    turned : (I,) array
+        By how much the body turns at most since the start [rad]; between two instants by the difference.
+    slip : (I,) array
+        By how much the velocity is off the heading at most [rad].
+    course, veer : float, (I,) array
+        Direction of the velocity at the start, and by how much it differs from that at most [rad].
+    forward, braking : (I - 1,) array
+        Bounds on the acceleration along the velocity and against it, in the piece after each instant [m/s²].
+    """
+
+    low: Array
+    high: Array
+    turned: Array
+    slip: Array
+    course: float
+    veer: Array
+    forward: Array
+    braking: Array
+
+
+@dataclass(frozen=True)
+class Motions:
+    """All motions from one start.
+
+    Attributes
+    ----------
+    position, velocity : (2,) array
+        Of the reference point [m], [m/s].
+    heading, yaw_rate : float
+        Of the body [rad], [rad/s].
+    acceleration : float
+        Bound A on the reference point's acceleration [m/s²].
+    curvature : float
+        Bound on the body's turning per way of the reference point [1/m].
+    rear : float
+        How far the rear axle is behind the reference point [m]; 0 where it is that point.
+    ahead : float
+        How far the middle of the body is ahead of the reference point [m].
+    half_length, half_width : float
+        Of the body, with the margin that has to be kept [m].
+    forward, braking : float
+        Bounds on the acceleration along the velocity and against it [m/s²].
+    power : float
+        Bound on the acceleration along the velocity times the speed [m²/s³].
+    """
+
+    position: Array
+    velocity: Array
+    heading: float
+    yaw_rate: float
+    acceleration: float
+    curvature: float
+    rear: float
+    ahead: float
+    half_length: float
+    half_width: float
+    forward: float
+    braking: float
+    power: float
+
+    @cached_property
+    def speed(self) -> float:
+        """Of the reference point at the start [m/s]."""
+        return float(np.hypot(*self.velocity))
+
+    @cached_property
+    def corners(self) -> Array:
+        """Corners (4, 2) of the body, seen from the reference point, anticlockwise [m]."""
+        front, back, side = self.ahead + self.half_length, self.ahead - self.half_length, self.half_width
+        return np.array([[front, side], [back, side], [back, -side], [front, -side]])
+
+    @cached_property
+    def reach(self) -> float:
+        """How far the body reaches from the reference point [m]."""
+        return float(np.hypot(*self.corners.T).max())
+
+    def turning(self, times: Array) -> Turning:
+        """Bounds at instants (I,) [s] since the start; the first is 0.
+
+        Notes
+        -----
+        The velocity stays within A t of that at the start, so its direction within asin(A t / v0). The rate
+        of turning is at most that of :meth:`_rate`, over small pieces at either end.
+        """
+        fine = np.concatenate(
+            [[0.0], *(np.linspace(a, b, _FINE + 1)[1:] for a, b in pairwise(times.tolist()))]
+        )
+        pieces = list(zip(fine[:-1].tolist(), fine[1:].tolist(), strict=True))
+
+        def turns(begin: float) -> Array:
+            angles = np.cumsum([(b - a) * self._rate(a, b, begin) for a, b in pieces])
+            return np.concatenate(([0.0], angles[_FINE - 1 :: _FINE])) * (1.0 + 1e-9)
+
+        turned = turns(abs(self.yaw_rate))
+        left, right = turned, turned
+        if self.rear:
+            left, right = turns(max(self.yaw_rate, 0.0)), turns(max(-self.yaw_rate, 0.0))
+        slips = np.array([self._slip(a, b) for a, b in [(0.0, 0.0), *pieces]])
+        slip = np.maximum.accumulate(slips)[::_FINE]
+        gone = self.acceleration * times
+        veer = np.where(gone < self.speed, np.arcsin(np.minimum(gone / max(self.speed, 1e-9), 1.0)), np.inf)
+        course = self.heading
+        if self.rear:
+            course += float(wrap(math.atan2(self.velocity[1], self.velocity[0]) - self.heading))
+        low = np.maximum(self.heading - right, np.minimum(self.heading, course - veer)) - _ANGLE
+        high = np.minimum(self.heading + left, np.maximum(self.heading, course + veer)) + _ANGLE
+        slow = np.maximum(self.speed - gone[1:], 1e-9)
+        forward = np.minimum(np.minimum(self.forward, self.power / slow), self.acceleration)
+        braking = np.full(len(forward), min(self.braking, self.acceleration))
+        return Turning(low, high, turned, slip, course, veer + _ANGLE, forward, braking)
+
+    def _rate(self, start: float, end: float, begin: float) -> float:
+        """Bound on the rate of turning to one side [rad/s] between two times [s] after the start.
+
+        ``begin`` is the rate to that side at the start, or 0. Of the rear axle: the largest of min(A / v,
+        curvature v) over the speeds v that are possible. Of the middle: see :meth:`_across`.
+        """
+        a, most = self.acceleration, self.curvature * (self.speed + self.acceleration * end)
+        if self.rear:
+            return min(most, self._across(start, end, begin) / self.rear)
+        slow = max(self.speed - a * end, 0.0)
+        if slow >= math.sqrt(a / self.curvature):
+            return a / slow
+        return min(most, math.sqrt(a * self.curvature))
+
+    def _across(self, start: float, end: float, begin: float) -> float:
+        """Bound on the speed w of the middle across the body to one side [m/s] between two times.
+
+        w = rear * rate, and dw/dt = a_n - (v_r / rear) w, where the acceleration across the body is at most
+        A and the rear axle's speed v_r at least r. So w is at most what the linear equation with r gives,
+        which is monotonic in time.
+        """
+        return self._swing(start, end, begin, self._axle(end))
+
+    def _swing(self, start: float, end: float, begin: float, axle: float) -> float:
+        most = 0.0
+        for t in (start, end):
+            decay = axle * t / self.rear
+            share = -math.expm1(-decay) / decay if decay > 1e-9 else 1.0
+            most = max(most, self.rear * begin * math.exp(-decay) + self.acceleration * t * share)
+        return most
+
+    def _axle(self, t: float) -> float:
+        """Smallest speed of the rear axle [m/s] until a time after the start, of the middle's motions."""
+        slow = max(self.speed - self.acceleration * t, 0.0)
+        axle = slow * math.cos(self._largest_slip)
+        for _ in range(4):
+            across = self._swing(0.0, t, abs(self.yaw_rate), axle)
+            axle = max(axle, math.sqrt(max(slow * slow - across * across, 0.0)))
+        return axle
+
+    @cached_property
+    def _largest_slip(self) -> float:
+        return math.asin(min(self.rear * self.curvature, 1.0))
+
+    def _slip(self, start: float, end: float) -> float:
+        """Bound on the slip angle [rad] between two times [s] after the start."""
+        if not self.rear:
+            return 0.0
+        slow = self.speed - self.acceleration * end
+        if slow <= 0.0:
+            return self._largest_slip
+        across = self._across(start, end, abs(self.yaw_rate))
+        return min(self._largest_slip, math.asin(min(across / slow, 1.0))) + _ANGLE

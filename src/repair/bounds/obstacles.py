@@ -1,0 +1,92 @@
+"""What is occupied at instants, as convex polygons: the traffic in its continuous motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.world.tracks import BEFORE, CIRCLE, INSTANT, MOVING, POLYGON, Index, Track, tracks_of
+
+if TYPE_CHECKING:
+    from repair.scene.traffic.obstacle import Obstacle
+
+__all__ = ["Occupied", "occupied"]
+
+_AROUND = np.exp(2j * np.pi * np.arange(16) / 16).view(np.float64).reshape(-1, 2)
+_CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+_INWARDS = 1e-5  # by how much of their size polygons are smaller than what they stand for
+
+
+class Occupied(NamedTuple):
+    """Convex polygons at instants.
+
+    Attributes
+    ----------
+    vertices : (I, M, K, 2) array
+        Anticlockwise [m]; the last is repeated to fill K, NaN where there is nothing.
+    owner : (M,) int array
+        Index of the obstacle; -1 for what is no road.
+    """
+
+    vertices: Array
+    owner: Index
+
+
+def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Occupied:
+    """Where the obstacles are at samples, ``substeps`` to a scenario's step.
+
+    Rectangles, circles and rigid polygons move and turn linearly in time between the steps, sets hold on
+    both sides of theirs: as :class:`repair.world.collision.CollisionWorld` has it. Polygons that do not
+    move as one body count at the steps alone.
+    """
+    columns: list[Array] = []
+    owner: list[int] = []
+    for index, obstacle in enumerate(obstacles):
+        held = obstacle.role == "set_based"
+        tracks = [t for t in tracks_of(obstacle, n_samples, substeps) if t.mode != INSTANT]
+        if not held and tracks[0].mode != MOVING:
+            tracks = tracks[:1]
+        for track in tracks:
+            steps_alone = not held and track.mode == BEFORE
+            for part in _parts(track, n_samples, substeps if steps_alone else 1):
+                inside = part.mean(axis=1, keepdims=True)
+                columns.append(inside + (part - inside) * (1.0 - _INWARDS))
+                owner.append(index)
+    size = max((part.shape[1] for part in columns), default=3)
+    vertices = np.full((n_samples, len(columns), size, 2), np.nan)
+    for m, part in enumerate(columns):
+        vertices[:, m, : part.shape[1]] = part
+        vertices[:, m, part.shape[1] :] = part[:, -1:]
+    return Occupied(vertices, np.array(owner, dtype=np.intp))
+
+
+def _parts(track: Track, n_samples: int, every: int) -> list[Array]:
+    """Each convex part of a track over the samples (I, K, 2); NaN where it is not there."""
+    if track.kind != POLYGON:
+        x, y, heading, a, b = track.rows.T
+        if track.kind == CIRCLE:
+            return [np.stack((x, y), axis=1)[:, None] + _AROUND * a[:, None, None]]
+        u, w = _CORNERS[:, 0] * a[:, None], _CORNERS[:, 1] * b[:, None]
+        c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+        return [np.stack((x[:, None] + c * u - s * w, y[:, None] + s * u + c * w), axis=2)]
+    count = max((len(p) for p in track.polygons), default=0)
+    size = max((len(v) for p in track.polygons for v in p), default=3)
+    made = [np.full((n_samples, size, 2), np.nan) for _ in range(count)]
+    for i in range(0, n_samples, every):
+        x, y, heading = track.rows[i, :3]
+        if not np.isfinite(x):
+            continue
+        c, s = np.cos(heading), np.sin(heading)
+        for part, shape in zip(made, track.polygons[track.steps[i]], strict=False):
+            placed = shape @ np.array([[c, s], [-s, c]]) + (x, y)
+            placed = placed if _area(placed) > 0.0 else placed[::-1]
+            part[i, : len(placed)], part[i, len(placed) :] = placed, placed[-1]
+    return made
+
+
+def _area(p: Array) -> float:
+    q = np.roll(p, -1, axis=0)
+    return float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))

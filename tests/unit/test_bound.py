@@ -1,0 +1,169 @@
+"""The bound on the time to react: what it says where the answer is known, and what it never may say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from benchmarks.shooting import Shooting
+from tests.crossings import crossing
+from tests.roads import driving, lanelet, problem, scenario, state
+
+import repair
+from repair.bounds.latest import earliest
+from repair.bounds.settings import KINDS, BoundConfig
+
+
+def prepared(tmp_path, text, *overrides):
+    file = tmp_path / "scenario.xml"
+    file.write_text(text, encoding="utf-8")
+    config = repair.load_config(overrides=["reference.source=constant", *overrides])
+    return repair.prepare(repair.load_scene(file, config), config)
+
+
+def wall(own=10.0, at=60.0, width=60.0):
+    """A wall across the whole road, which stands."""
+    steps = "<time><intervalStart>39</intervalStart><intervalEnd>40</intervalEnd></time>"
+    shape = f"<rectangle><length>1.0</length><width>{width}</width></rectangle>"
+    body = f"<type>roadBoundary</type><shape>{shape}</shape>{state(at, 0.0)}"
+    block = f'<staticObstacle id="30">{body}</staticObstacle>'
+    moving = driving(31, 300.0, 0.0, 0.0, range(1, 81))  # only says how long the traffic is known
+    road = lanelet(1, range(-40, 401, 20), [0.0] * 23, width=7.0)
+    wanted = problem(100, state(20.0, 0.0, v=own), f"<goalState>{steps}</goalState>")
+    return scenario(road=road, obstacles=block + moving, problems=wanted)
+
+
+def test_a_wall_is_too_late_from_the_braking_distance_on(tmp_path):
+    situation = prepared(tmp_path, wall())
+    found = repair.bound(situation)
+    vehicle, checker = situation.scene.vehicle, situation.config.checker
+    gap = 60.0 - 0.5 - vehicle.half_length - 20.0
+    exact = (gap - 10.0**2 / (2 * vehicle.a_max)) / 10.0
+    assert exact <= found["vehicle"].time <= exact + 0.1  # who turns is shorter
+    brake = -1.01 * situation.limits.a_min
+    exact = (gap - checker.clearance - 10.0**2 / (2 * brake)) / 10.0
+    assert exact <= found["search"].time <= exact + 0.1
+    assert all(b.proven and b.complete for b in found.values())
+
+
+def test_a_finer_step_is_no_later_and_a_coarser_one_no_earlier(tmp_path):
+    situation = prepared(tmp_path, wall(), "checker.substeps=8")
+    times = [repair.bound(situation, BoundConfig(step=s))["vehicle"].time for s in (0.0125, 0.025, 0.1)]
+    assert times == sorted(times)
+
+
+def test_nothing_is_proven_where_there_is_room(tmp_path):
+    """A narrow block: at any time before it, a small swerve avoids it."""
+    situation = prepared(
+        tmp_path,
+        wall(width=0.2, at=60.0).replace(
+            "<y>0.0</y></point></position><orientation><exact>0.0</exact></orientation><time><exact>0</exact></time><velocity><exact>0",
+            "<y>0.7</y></point></position><orientation><exact>0.0</exact></orientation><time><exact>0</exact></time><velocity><exact>0",
+        ),
+    )
+    late = repair.bound(situation)["vehicle"].time
+    assert late > situation.conflict.time - 0.5
+
+
+def test_without_a_conflict_there_is_nothing_to_prove(tmp_path):
+    found = repair.bound(prepared(tmp_path, wall(at=300.0)))
+    assert {b.status for b in found.values()} == {"no_conflict"}
+    assert not any(b.proven for b in found.values())
+
+
+def test_the_limits_of_the_search_say_nothing_where_they_are_off(tmp_path):
+    situation = prepared(tmp_path, wall(), "checker.limits=false")
+    found = repair.bound(situation)
+    assert found["search"].status == "limits_off"
+    assert found["vehicle"].proven
+
+
+def test_no_time_is_no_proof(tmp_path):
+    found = repair.bound(prepared(tmp_path, wall()), BoundConfig(time_limit=0.0, kinds=["vehicle"]))
+    assert found["vehicle"].status == "time"
+    assert not found["vehicle"].complete
+    assert math.isinf(found["vehicle"].time)
+
+
+def test_fewer_nodes_prove_no_more(tmp_path):
+    situation = prepared(tmp_path, wall())
+    one, many = (
+        repair.bound(situation, BoundConfig(nodes=n, kinds=["vehicle"]))["vehicle"] for n in (1, 200)
+    )
+    assert one.time > many.time
+
+
+@pytest.mark.parametrize("last", [-1, 0, 1, 7, 30])
+def test_the_earliest_is_found_whatever_it_is(last):
+    for first in range(last + 2):
+        asked = []
+
+        def proves(k, first=first, asked=asked):
+            asked.append(k)
+            return k >= first
+
+        assert earliest(last, proves) == (first if first <= last else None)
+        assert len(set(asked)) == len(asked)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5, 8, 9])
+def test_no_motion_is_found_at_or_after_a_bound(tmp_path, seed):
+    """Traffic of any shape, speed and step; direct shooting knows nothing of the proof."""
+    situation = prepared(tmp_path, crossing(seed).text)
+    if not math.isfinite(situation.conflict.time):
+        pytest.skip("no conflict")
+    end = min(
+        situation.t_end, max(situation.conflict.time, min(situation.conflict.contact_time, 100.0)) + 0.5
+    )
+    for kind, found in repair.bound(situation).items():
+        if not found.proven:
+            continue
+        shooting = Shooting(situation, kind, end)
+        for t_rep in {found.time, 0.5 * (found.time + situation.conflict.time)}:
+            assert not shooting.best(t_rep, tries=64, rounds=4, seed=seed).free
+
+
+def test_no_backend_repairs_at_or_after_a_bound(tmp_path):
+    config = repair.load_config(
+        overrides=[
+            "reference.source=constant",
+            "search.delta_t=0.25",
+            "search.rule=scan",
+            "bound.wanted=true",
+        ]
+    )
+    file = tmp_path / "scenario.xml"
+    file.write_text(wall(), encoding="utf-8")
+    for backend in ("ego", "casadi", "qptr"):
+        config.backend = backend
+        result = repair.repair(file, config)
+        assert set(result.bounds) == set(KINDS)
+        latest = max((p.t_rep for p in result.search.probes if p.feasible), default=-1.0)
+        assert latest < min(b.time for b in result.bounds.values())
+        said = result.to_dict()["bound"]
+        assert said["t_bound_s"] == pytest.approx(min(b.time for b in result.bounds.values()))
+        assert said["gap_s"] == pytest.approx(said["t_bound_s"] - result.f_ttr)
+        assert said["proven_optimal"] is (said["gap_s"] <= 0.25 + 1e-9)
+
+
+def test_the_same_proof_each_time(tmp_path):
+    situation = prepared(tmp_path, crossing(4).text)
+    one, two = (repair.bound(situation) for _ in range(2))
+    for kind in KINDS:
+        assert one[kind].time == two[kind].time
+        assert one[kind].nodes == two[kind].nodes
+        if one[kind].proof:
+            assert one[kind].proof.attempt.tree == two[kind].proof.attempt.tree
+
+
+def test_the_bound_is_in_the_console(tmp_path, capsys):
+    from repair.cli import main
+
+    file = tmp_path / "scenario.xml"
+    file.write_text(wall(), encoding="utf-8")
+    assert main(["run", str(file), "--reference", "constant", "--bound", "--set", "search.delta_t=0.1"]) == 0
+    text = capsys.readouterr().out
+    assert "proven too late from" in text
+    assert "Gap" in text
+    assert not np.isnan(float(text.split("Gap")[1].split()[0]))
