@@ -27,6 +27,8 @@ from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
 from repair.outcome.record import driven_curve
 from repair.preparation import Phases, Prepared, among, prepare
+from repair.report.notebook import page_of
+from repair.report.text import headline
 from repair.save import Saved, saved
 from repair.scene.commonroad import load_scene, with_traffic
 from repair.scene.scene import Scene
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
 __all__ = ["RepairResult", "find", "make", "repair", "search"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RepairResult:
     """A repair, with all that is needed to use it or to look at it.
 
@@ -78,6 +80,13 @@ class RepairResult:
     capabilities: Capabilities = field(default_factory=Capabilities)
     modes: tuple[ModeResult, ...] = ()
     bounds: dict[str, Bound] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name:9} {text}" for name, text in headline(self.to_dict()))
+
+    def _repr_html_(self) -> str:
+        """The same with the view from above, for notebooks."""
+        return page_of(self.outcome)
 
     @property
     def status(self) -> SearchStatus:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Array", "Points", "column", "frozen", "largest", "number", "smallest", "wrap"]
+__all__ = ["Array", "Points", "column", "frozen", "in_seconds", "largest", "number", "smallest", "wrap"]
 
 #: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
 Array = npt.NDArray[np.floating[Any]]
@@ -46,6 +46,11 @@ def number(value: float | None, digits: int = 9) -> float | None:
     if value is None or not math.isfinite(value):
         return None
     return round(float(value), digits) + 0.0
+
+
+def in_seconds(value: float | None) -> str:
+    """A time for one line of words: ``2.4 s``, ``unlimited``, ``none``."""
+    return "none" if value is None else f"{value:.4g} s" if math.isfinite(value) else "unlimited"
 
 
 def column(values: Any, digits: int = 9) -> list[float | None]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from repair.arrays import in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Situation"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Situation:
     """Everything that is the same for every backend: made once, searched many times.
 
@@ -55,6 +56,10 @@ class Situation:
     t_reference: float
     t_end: float
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        ttc, name = in_seconds(self.conflict.time), type(self).__name__
+        return f"<{name} of {self.scene!r}: TTC {ttc} ({self.conflict.kind}), repairs until {self.t_end:g} s>"
 
     @cached_property
     def source(self) -> ProblemFactory:

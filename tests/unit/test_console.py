@@ -378,3 +378,19 @@ def test_places_and_amounts_are_printed(path):
     lines = summary(record, None).splitlines()
     assert "the reference leaves the road (0.05 m² beside the road at (3.0, 4.0))" in line(lines, "TTC")
     assert "  0.00 s: off_road at 1.00 s: 0.2 m² beside the road at (5.0, 6.0)" in lines
+
+
+def test_a_result_shows_itself_on_one_screen(scenarios):
+    """Without its arrays, in a terminal and in a notebook; and so do its parts."""
+    scene = repair.load_scene(scenarios / "DEU_Flensburg-6_1_T-1.xml")
+    result = repair.repair(scene, preset="scenario_1")
+    lines = repr(result).splitlines()
+    assert len(lines) <= 10
+    assert max(map(len, lines)) < 200
+    assert any(line.startswith("F-TTR") for line in lines)
+    page = result._repr_html_()
+    assert "<th" in page
+    assert "data:image/png;base64," in page
+    for part in (scene, result.prepared, result.outcome):
+        assert len(repr(part)) < 300
+        assert scene.id in repr(part)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from repair.arrays import in_seconds
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve
 from repair.io.commonroad import to_trajectory
@@ -17,7 +18,7 @@ from repair.vehicle.states import DrivenStates
 __all__ = ["Cycle"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Cycle:
     """The answer of one cycle. Times count from ``now``.
 
@@ -53,6 +54,13 @@ class Cycle:
     complete: bool
     rebuilt: tuple[str, ...]
     elapsed: float
+
+    def __repr__(self) -> str:
+        how = ", kept" if self.kept else "" if self.complete else ", cut short"
+        return (
+            f"<Cycle at {self.now:g} s: {self.status.value}{how}, TTC {in_seconds(self.ttc)}, "
+            f"F-TTR {in_seconds(self.f_ttr)}>"
+        )
 
     @property
     def status(self) -> SearchStatus:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from repair.arrays import Array
+from repair.arrays import Array, in_seconds
 
 __all__ = ["Body", "Box", "Drawing", "Line", "Outcome"]
 
@@ -121,7 +121,7 @@ class Drawing:
     edges: tuple[Array, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Outcome:
     """A result without the vehicle, the solver and the scene that made it.
 
@@ -138,6 +138,12 @@ class Outcome:
 
     record: dict[str, Any]
     drawing: Drawing | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Outcome of {self.scenario}, {self.backend}: {self.status}, TTC {in_seconds(self.ttc)}, "
+            f"F-TTR {in_seconds(self.f_ttr)}>"
+        )
 
     @property
     def scenario(self) -> str:

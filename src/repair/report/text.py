@@ -9,7 +9,7 @@ from typing import Any
 from repair.report.bound import bound_rows
 from repair.report.notes import grouped
 
-__all__ = ["fixed", "probe_table", "summary"]
+__all__ = ["fixed", "headline", "probe_table", "summary"]
 
 _KINDS = {
     "margin": "the safety margin of obstacle {id} is entered",
@@ -41,6 +41,20 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     written : sequence of Path
         Files that were written.
     """
+    lines = [f"{name:9} {text}" for name, text in headline(content, preset)]
+    if content["probes"]:
+        lines += ["", *probe_table(content["probes"])]
+    lines += ["", f"Time      {_times(content['time_s'])}"]
+    lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(grouped(content["notes"]))]
+    if written:
+        lines += [f"{'Files' if k == 0 else '':9} {path}" for k, path in enumerate(written)]
+    else:
+        lines.append("Files     none written; --out DIR writes result.json, the solution file and figures")
+    return "\n".join(lines)
+
+
+def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[str, str]]:
+    """What is asked first: scenario, backend, status, TTC, F-TTR and what is driven, each with its name."""
     origin = content["provenance"]
     label = _PROVENANCE[origin["kind"]].format(name=origin["name"], sha=(origin["sha256"] or "")[:12])
     rows = [
@@ -56,18 +70,9 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
         rows.append(("Repair", _extremes(content)))
     if content.get("metrics"):  # results of earlier versions have none
         rows.append(("Metrics", _metrics(content["metrics"])))
-    lines = [f"{name:9} {text}" for name, text in rows]
     if not content["complete"]:
-        lines.append("          The search was stopped early: a later time-to-repair may be feasible.")
-    if content["probes"]:
-        lines += ["", *probe_table(content["probes"])]
-    lines += ["", f"Time      {_times(content['time_s'])}"]
-    lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(grouped(content["notes"]))]
-    if written:
-        lines += [f"{'Files' if k == 0 else '':9} {path}" for k, path in enumerate(written)]
-    else:
-        lines.append("Files     none written; --out DIR writes result.json, the solution file and figures")
-    return "\n".join(lines)
+        rows.append(("", "The search was stopped early: a later time-to-repair may be feasible."))
+    return rows
 
 
 def _decided(content: dict[str, Any]) -> list[tuple[str, str]]:

@@ -49,7 +49,7 @@ class SpeedLimit:
         return np.asarray(self.speed[index])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """A planning problem made ready: frame along the driven path, ego, road and obstacles.
 
@@ -124,6 +124,12 @@ class Scene:
     planning_problem: Any
     settings: SceneConfig = field(default_factory=SceneConfig)
     modes: tuple[Mode, ...] = ()
+
+    def __repr__(self) -> str:
+        return (
+            f"<Scene {self.id}, planning problem {self.planning_problem_id}: "
+            f"{len(self.obstacles)} obstacles, {self.horizon:g} s in steps of {self.dt:g} s, {self.initial_state.velocity:.4g} m/s>"
+        )
 
     @property
     def vehicle(self) -> Vehicle:
