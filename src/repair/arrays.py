@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,18 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Array", "Points", "column", "frozen", "in_seconds", "largest", "number", "smallest", "wrap"]
+__all__ = [
+    "Array",
+    "Points",
+    "column",
+    "frozen",
+    "in_seconds",
+    "largest",
+    "names",
+    "number",
+    "smallest",
+    "wrap",
+]
 
 #: Floating point; made as float64 throughout (NumPy types many results as some floating dtype only).
 Array = npt.NDArray[np.floating[Any]]
@@ -24,6 +36,13 @@ def frozen(values: npt.ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def names(values: Iterable[int]) -> npt.NDArray[Any]:
+    """Ids (N,) as an array: 64-bit integers, or Python's own where one does not fit (they have no end)."""
+    listed = [int(value) for value in values]
+    fit = all(-(2**63) <= value < 2**63 for value in listed)
+    return np.array(listed, dtype=np.int64 if fit else object)
 
 
 def largest(values: Array) -> float:

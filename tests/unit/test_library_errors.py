@@ -524,19 +524,6 @@ def test_the_official_checker_needs_none_either(written):
     assert done.returncode == 0, done.stderr
 
 
-def test_an_id_beyond_64_bits(tmp_path):
-    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
-    huge = 2**63 + 12
-    ahead = roads.driving(huge, 45.0, 0.0, 2.0)
-    file.write_text(roads.scenario(obstacles=ahead), encoding="utf-8")
-    try:
-        result = repair.repair(file, overrides=CONSTANT)
-        said = str(result.to_dict()["conflict"]["obstacle_id"])
-    except RepairError as error:
-        said = sentence(error)
-    assert str(huge) in said
-
-
 # -- sweeps: before the work -----------------------------------------------------------------------
 
 

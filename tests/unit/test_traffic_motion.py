@@ -259,9 +259,3 @@ def test_an_obstacle_without_prediction_moves_on_where_that_is_asked_for(tmp_pat
     np.testing.assert_allclose(moving.obstacles[0].rectangles[10, 0], 42.0)
     assert constant(moving).conflict.time == np.inf
     assert not any("stand still" in note for note in moving.notes)
-
-
-def test_an_id_that_no_array_holds_is_a_sentence(tmp_path):
-    text = roads.SLOW.replace('id="30"', f'id="{2**64}"')
-    with pytest.raises(ScenarioError, match="its id is beyond"):
-        scene_of(tmp_path, text)

@@ -229,10 +229,34 @@ def _region(name: int, stated: Sequence[Any]) -> Body:
     return Body(name, None, np.empty((0, 3)), 0.0, tuple(held))
 
 
-def _of_scene(obstacle: Obstacle, steps: int) -> list[Body]:
-    """An obstacle as the search reads it: between two steps the hull of both, part by part."""
+def _rigid(obstacle: Obstacle, steps: int) -> Body | None:
+    """A rectangle or circle of one size that moves and turns; None for anything else."""
     import shapely
 
+    table = obstacle.rectangles if obstacle.rectangles is not None else obstacle.circles
+    if obstacle.role not in ("static", "dynamic") or table is None:
+        return None
+    table = table[: steps + 1]
+    sizes = table[np.isfinite(table[:, 0]), 3 if obstacle.rectangles is not None else 2 :]
+    if not len(sizes) or np.ptp(sizes, axis=0).any():
+        return None
+    if obstacle.rectangles is not None:
+        a, b = (float(half) for half in sizes[0])
+        outline, poses = shapely.box(-a, -b, a, b), table[:, :3]
+    else:
+        radius = float(sizes[0, 0])
+        outline = shapely.Point(0.0, 0.0).buffer(radius / np.cos(np.pi / 64), quad_segs=16)
+        poses = np.column_stack([table[:, :2], 0.0 * table[:, 0]])  # NaN where it is not there
+    return Body(obstacle.id, outline, np.asarray(poses, dtype=np.float64), _radius(outline))
+
+
+def _of_scene(obstacle: Obstacle, steps: int) -> list[Body]:
+    """An obstacle as the search reads it: rigid, or between two steps the hull of both, part by part."""
+    import shapely
+
+    rigid = _rigid(obstacle, steps)
+    if rigid is not None:
+        return [rigid]
     rows: list[list[Any]] = []
     for k in range(min(steps, obstacle.n_steps) + 1):
         parts: list[Any] = []

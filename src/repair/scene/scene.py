@@ -16,7 +16,7 @@ from repair.scene.road.bounds import LateralBounds
 from repair.scene.settings import SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.prediction import Mode
-from repair.scene.traffic.stepwise import expand_intervals
+from repair.scene.traffic.stepwise import expand_sets
 from repair.vehicle.model import VehicleModel
 from repair.vehicle.parameters import Vehicle
 
@@ -139,15 +139,15 @@ class Scene:
     def official(self) -> Any:
         """The CommonRoad scenario with the traffic of this scene alone: a copy.
 
-        Recordings of the ego itself are left out, with which every solution would collide. Occupancies over
-        intervals are given step by step, since the drivability checker counts each at one step only.
+        Recordings of the ego itself are left out, with which every solution would collide. Sets that hold
+        over intervals, start late or pause are given step by step, since the drivability checker counts them.
         """
         kept = {id(obstacle.source) for obstacle in self.obstacles}
         gone = {o.obstacle_id for o in self.scenario.dynamic_obstacles if id(o) not in kept}
         copied = deepcopy(self.scenario)
         for obstacle in [o for o in copied.dynamic_obstacles if o.obstacle_id in gone]:
             copied.remove_obstacle(obstacle)
-        expand_intervals(copied, self.initial_time_step + self.n_steps)
+        expand_sets(copied, self.initial_time_step + self.n_steps)
         return copied
 
     @property

@@ -21,7 +21,9 @@ class SceneConfig:
     planning_problem: int | None = setting(None, "id; null: the smallest")
     horizon: float | None = setting(None, "cap of the planning horizon [s]", low=1e-3, high=1e3)
     after_prediction: str = setting(
-        "remove", "what becomes of an obstacle after its prediction", choices=AFTER_PREDICTION
+        "remove",
+        "what becomes of an obstacle after its prediction; one without any stands, or keeps its velocity",
+        choices=AFTER_PREDICTION,
     )
     smoothing: float = setting(
         0.15, "how far smoothing may move the route's centre line [m]", low=1e-4, high=10.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +52,7 @@ class Occupancy:
     t : (T,) array
         Times of the steps [s], starting at 0, equally spaced.
     ids : (N,) int array
-        CommonRoad obstacle ids.
+        CommonRoad obstacle ids; objects where one has more than 64 bits.
     lower, upper : (N, T, 2) array
         Corners ``[s, l]`` of the boxes [m], S_offset and L_offset included.
     static : (N,) bool array
@@ -59,7 +60,7 @@ class Occupancy:
     """
 
     t: Array
-    ids: npt.NDArray[np.int64]
+    ids: npt.NDArray[Any]
     lower: Array
     upper: Array
     static: npt.NDArray[np.bool_]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, names
 from repair.curves.base import FrenetTrajectory
 from repair.scene.road.passes import every_pass
 from repair.timegrid import INSTANT
@@ -74,7 +74,7 @@ def build_occupancy(
                 f"obstacle {obstacle.id} is (partly) outside of the frame's domain from t = {first:g} s; "
                 "only the check of the true shapes sees it there"
             )
-    ids = np.array([obstacles[k].id for k in which], dtype=np.int64)
+    ids = names(obstacles[k].id for k in which)
     static = np.array([obstacles[k].role in ("static", "environment") for k in which], dtype=np.bool_)
     t = frozen(np.arange(steps) * dt)
     lower, upper = np.array(corners).reshape(-1, 2, steps, 2).transpose(1, 0, 2, 3)
@@ -166,9 +166,7 @@ def shrink_to_start(
         upper = np.concatenate([upper, [high for _, _, high in more]])
         ids += [name for name, _, _ in more]
         static = np.append(static, [_constant(low) and _constant(high) for _, low, high in more])
-    made = Occupancy(
-        occupancy.t, np.array(ids, dtype=np.int64), frozen(lower), frozen(upper), static.astype(np.bool_)
-    )
+    made = Occupancy(occupancy.t, names(ids), frozen(lower), frozen(upper), static.astype(np.bool_))
     return made, tuple(notes)
 
 

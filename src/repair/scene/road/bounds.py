@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, names
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.lanes import Lane
 
@@ -63,7 +64,7 @@ class LaneletCrossings:
 
     s: Array
     row: npt.NDArray[np.intp]
-    lanelet: npt.NDArray[np.int64]
+    lanelet: npt.NDArray[Any]
     low: Array
     high: Array
     along: npt.NDArray[np.bool_]
@@ -111,7 +112,7 @@ def crossings(frame: FrenetFrame, lanes: Mapping[int, Lane], *, spacing: float =
         member = which == number
         along[member] = _runs_along(lanes[ids[number]].center, middle[member], tangent[row[member]])
     return LaneletCrossings(
-        s, row, np.array(ids, dtype=np.int64)[which], lateral.min(axis=1), lateral.max(axis=1), along
+        s, row, names(ids)[which], lateral.min(axis=1), lateral.max(axis=1), along
     )  # fmt: skip
 
 
@@ -149,7 +150,7 @@ def lateral_bounds(
     if same_direction:
         use &= found.along
     if lanelets is not None:
-        named = np.isin(found.lanelet, np.fromiter(lanelets, dtype=np.int64))
+        named = np.isin(found.lanelet, names(lanelets))
         use = (use | named) if same_direction else named
     row, low, high = found.row[use], found.low[use], found.high[use]
     count = len(found.s)

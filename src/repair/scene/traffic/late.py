@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from repair.scene.traffic.stepwise import holds_over_intervals, pauses
+
 __all__ = ["steps_late"]
 
 
@@ -29,4 +31,6 @@ def steps_late(obstacle: Any) -> int:
     placed = obstacle.initial_state.time_step + 1
     if getattr(first, "start", first) <= placed <= getattr(first, "end", first):
         return 0
+    if trajectory is None and (holds_over_intervals(obstacle) or pauses(obstacle)):
+        return 0  # it is asked about them step by step
     return int(placed - getattr(first, "start", first))

@@ -9,12 +9,12 @@ What CommonRoad leaves open is settled here, towards the larger occupancy:
 - a dynamic obstacle without a prediction stands where it is (noted), or moves on where that is asked for;
 - a set-based occupancy over [k, k + 1] counts at k and at k + 1;
 - a trailer follows its tractor (:mod:`repair.scene.traffic.trailers`);
-- after its prediction an obstacle is gone (CommonRoad's own reading), or held, or moves on.
+- after its prediction an obstacle is gone (CommonRoad's own reading), or held, or moves on;
+- where occupancies start late or pause, the obstacle is absent, as for commonroad-io (noted).
 
-A prediction with a hole, or with steps out of order, is refused: commonroad-io and the drivability
-checker count its states instead of reading their time steps, and would put the obstacle elsewhere. A phantom,
-which neither looks at, is absent in between. Where CommonRoad's own collision check reads something else, the
-scene has a note.
+A trajectory with a hole, or with steps out of order, is refused: commonroad-io and the drivability
+checker count its states instead of reading their time steps, and would put the obstacle elsewhere. Where
+CommonRoad's own collision check reads something else, the scene has a note.
 """
 
 from __future__ import annotations
@@ -31,13 +31,12 @@ from repair.scene.traffic.late import steps_late
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import obstacle_of_rows, require_sane
 from repair.scene.traffic.shapes import Placed, occupied, off_centre
-from repair.scene.traffic.stepwise import holds_over_intervals
+from repair.scene.traffic.stepwise import holds_over_intervals, pauses
 from repair.scene.traffic.timeline import continued, headings_of, state_occupancy, steps_of, timeline
 from repair.scene.traffic.trailers import is_train
 
 __all__ = ["last_predicted_step", "obstacles_of"]
 
-_ID_MAX = 2**63 - 1  # what an array of integers can hold
 _NAMED = 5  # so many obstacles are named in a note
 _TURNED = 1e-3  # half of a heading [rad] from which on a body counts as turned
 
@@ -119,8 +118,6 @@ def obstacles_of(
     moves_on = after_prediction == "constant_velocity"
     for obstacle in _all(scenario):
         name = int(obstacle.obstacle_id)
-        if abs(name) > _ID_MAX:
-            raise ScenarioError(f"obstacle {name}: its id is beyond {_ID_MAX}")
         try:
             placed, role = _placed(obstacle, first_step, first_step + n_steps, moves_on)
         except ScenarioError as error:
@@ -167,7 +164,11 @@ def _read_otherwise(found: list[Obstacle]) -> list[str]:
         and off_centre(source.obstacle_shape)
         and np.abs(np.sin(0.5 * np.nan_to_num(states[:, 2]))).max() > _TURNED
     ]
-    notes = []
+    notes = [
+        f"obstacle {name} is absent from time step {low} to {high}, for which its occupancies say nothing"
+        for name, source, _ in of
+        for low, high in pauses(source)
+    ]
     if over:
         notes.append(
             f"{_named(over)}: occupancies over intervals count at every step of theirs; CommonRoad's own "

@@ -131,7 +131,7 @@ def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], s
     Raises
     ------
     ScenarioError
-        If its steps cannot be used: an interval at the start, a hole, or out of order.
+        If its steps cannot be used: an interval at the start, out of order, or a hole between states.
     """
     prediction = getattr(obstacle, "prediction", None)
     initial = getattr(obstacle, "initial_state", None)
@@ -156,8 +156,8 @@ def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], s
             body = shape if trajectory is None or step == order[0] else getattr(prediction, "shape", shape)
             placed[step] = state_occupancy(body, states[step], heading)
     if prediction is not None and trajectory is None:
-        # A phantom may pause: CommonRoad's own check never looks at it, and does not count its states.
-        _check_order([steps_of(o.time_step) for o in prediction.occupancy_set], states, initial is None)
+        # It may start late and pause: occupancies are found by their time step, not counted.
+        _check_order([steps_of(o.time_step) for o in prediction.occupancy_set], (), may_pause=True)
         for occupancy in prediction.occupancy_set:
             low, high = steps_of(occupancy.time_step)
             item = occupied(occupancy.shape)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +66,7 @@ class Separation:
     lower: Array
     upper: Array
     windows: Windows
-    ids: npt.NDArray[np.int64]
+    ids: npt.NDArray[Any]
     side: npt.NDArray[np.intp] | None = None
     claims: Array | None = None
     why: str = ""
