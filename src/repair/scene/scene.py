@@ -128,7 +128,8 @@ class Scene:
     def __repr__(self) -> str:
         return (
             f"<Scene {self.id}, planning problem {self.planning_problem_id}: "
-            f"{len(self.obstacles)} obstacles, {self.horizon:g} s in steps of {self.dt:g} s, {self.initial_state.velocity:.4g} m/s>"
+            f"{len(self.obstacles)} obstacles, {self.horizon:g} s in steps of {self.dt:g} s, "
+            f"{self.initial_state.velocity:.4g} m/s>"
         )
 
     @property
