@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import affinity
 
 STEP = 1e-3  # [s]
 
@@ -59,8 +58,13 @@ def _boxes(poses: np.ndarray, length: float, width: float) -> np.ndarray:
     return shapely.polygons(np.stack([x, y], axis=-1))
 
 
+def ego_boxes(ego: Ego) -> np.ndarray:
+    """The ego's rectangle at each of its poses, as shapely polygons (K,)."""
+    return _boxes(ego.poses, ego.length, ego.width)
+
+
 def _outline(shape):
-    """A CommonRoad shape about its own origin as a shapely geometry."""
+    """A CommonRoad shape in the plane, or about its own origin, as a shapely geometry."""
     if hasattr(shape, "shapes"):
         return shapely.union_all([_outline(part) for part in shape.shapes])
     if hasattr(shape, "radius"):  # commonroad-io 2024.3 gives half of it
@@ -68,51 +72,89 @@ def _outline(shape):
     return shape.shapely_object
 
 
-def _placed(shape, x: float, y: float, psi: float):
-    """A shape at a pose: its parts turned about their own centres (commonroad-io), and as a whole."""
-    if hasattr(shape, "shapes"):
-        return shapely.union_all([_placed(part, x, y, psi) for part in shape.shapes])
-    outline, centre = _outline(shape), tuple(float(c) for c in shape.center)
-    about = [centre] if np.hypot(*centre) < 1e-9 else [centre, (0.0, 0.0)]
-    turned = [affinity.rotate(outline, psi, point, use_radians=True) for point in about]
-    return affinity.translate(shapely.union_all(turned), x, y)
-
-
-def _moving(states, shape, first: int, dt: float, t: np.ndarray):
-    """Geometry of a rigid obstacle at times t (None where it is not there)."""
-    steps = {s.time_step - first: s for s in states}
-    found = []
-    for time in t:
-        k = time / dt
-        low = int(np.floor(k + 1e-9))
-        share = k - low
-        here, there = steps.get(low), steps.get(low + 1)
-        if here is None or (share > 1e-9 and there is None):
-            found.append(None)
+def _placed(shape, poses: np.ndarray):
+    """A shape at poses (K, 3), in pieces (K,): turned about their own centres, and as a whole."""
+    for part in getattr(shape, "shapes", [shape]):
+        if hasattr(part, "shapes"):
+            yield from _placed(part, poses)
             continue
-        x, y, psi = *here.position, here.orientation
-        if share > 1e-9:
-            turn = (there.orientation - psi + np.pi) % (2 * np.pi) - np.pi
-            x, y = (1 - share) * np.array([x, y]) + share * np.asarray(there.position)
-            psi += share * turn
-        found.append(_placed(shape, x, y, psi))
-    return found
+        points, centre = (
+            shapely.get_coordinates(_outline(part).exterior),
+            np.asarray(part.center, dtype=float),
+        )
+        c, s = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+        for about in [centre] if np.hypot(*centre) < 1e-9 else [centre, np.zeros(2)]:
+            x, y = (points - about).T
+            turned = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+            yield shapely.polygons(turned + about + poses[:, None, :2])
 
 
-def _stated(occupancies, first: int, dt: float, t: np.ndarray):
-    """Geometry of a set-based prediction: what is stated at a step, between two steps the union of both."""
-    at: dict[int, list] = {}
-    for occupancy in occupancies:
-        step = occupancy.time_step
-        for k in range(getattr(step, "start", step), getattr(step, "end", step) + 1):
-            at.setdefault(k - first, []).append(_outline(occupancy.shape))
-    found = []
-    for time in t:
-        k = time / dt
-        low = int(np.floor(k + 1e-9))
-        parts = at.get(low, []) + (at.get(low + 1, []) if k - low > 1e-9 else [])
-        found.append(shapely.union_all(parts) if parts else None)
-    return found
+def _poses(states, first: int, dt: float, t: np.ndarray) -> np.ndarray:
+    """Poses (K, 3) of a rigid obstacle at times t, linearly between its states; NaN where it is not there."""
+    at = {s.time_step - first: (*s.position[:2], s.orientation) for s in states}
+    begin = min(at)
+    table = np.full((max(at) - begin + 2, 3), np.nan)
+    for k, pose in at.items():
+        table[k - begin] = pose
+    low = np.floor(t / dt + 1e-9)
+    share = np.clip(t / dt - low, 0.0, 1.0)
+    row = low.astype(int) - begin
+    inside = (row >= 0) & (row < len(table) - 1)
+    row = np.where(inside, row, 0)
+    here, there = table[row], np.where(share[:, None] > 1e-9, table[row + 1], table[row])
+    change = there - here
+    change[:, 2] = (change[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    return np.where(inside[:, None], here + share[:, None] * change, np.nan)
+
+
+def _certain(state) -> bool:
+    return not (hasattr(state.position, "center") or hasattr(state.position, "shapes")
+                or hasattr(state.orientation, "start"))  # fmt: skip
+
+
+def draws_a_trailer(obstacle) -> bool:
+    """What commonroad-io 2024.3 lays on its tractor, and nobody judges here."""
+    prediction = getattr(obstacle, "prediction", None)
+    hitched = any(
+        "hitch_angle" in vars(s) for s in getattr(getattr(prediction, "trajectory", None), "state_list", ())
+    )
+    return hitched or bool(getattr(prediction, "wheelbase", None))
+
+
+def off_centre(obstacle) -> bool:
+    """Whether a moving body is not centred on its position, so that there are two readings of it."""
+    shape = getattr(obstacle, "obstacle_shape", None)
+    if shape is None or getattr(obstacle, "initial_state", None) is None:
+        return False
+    return any(np.hypot(*part.center) > 1e-3 for part in getattr(shape, "shapes", [shape]))
+
+
+def _regions(obstacle):
+    """What is stated at the steps: (step, region); None for a rigid obstacle with exact states."""
+    prediction, start = getattr(obstacle, "prediction", None), getattr(obstacle, "initial_state", None)
+    trajectory = getattr(prediction, "trajectory", None)
+    if prediction is not None and trajectory is None:
+        stated = [(o.time_step, o.shape) for o in prediction.occupancy_set]
+        if start is not None:
+            stated.append((start.time_step, obstacle.occupancy_at_time(start.time_step).shape))
+    elif trajectory is not None and not all(_certain(s) for s in (start, *trajectory.state_list)):
+        steps = range(start.time_step, trajectory.final_state.time_step + 1)
+        stated = [(k, obstacle.occupancy_at_time(k).shape) for k in steps if obstacle.occupancy_at_time(k)]
+    else:
+        return None
+    return [
+        (k, _outline(shape))
+        for step, shape in stated
+        for k in range(getattr(step, "start", step), getattr(step, "end", step) + 1)
+    ]
+
+
+def obstacles_of(scenario) -> list:
+    """All that can be met, of whatever role."""
+    return [
+        *scenario.static_obstacles, *scenario.dynamic_obstacles,
+        *getattr(scenario, "phantom_obstacle", ()), *getattr(scenario, "environment_obstacle", ()),
+    ]  # fmt: skip
 
 
 def contact_time(
@@ -126,33 +168,57 @@ def contact_time(
     apart: frozenset[int] = frozenset(),
 ) -> float:
     """First time [s] at which the ego meets an obstacle by more than ``deeper`` [m]; inf if never."""
+    return first_contact(ego, scenario, first, until, since=since, deeper=deeper, apart=apart)[0]
+
+
+def first_contact(
+    ego: Ego,
+    scenario,
+    first: int,
+    until: float,
+    *,
+    since: float = 0.0,
+    deeper: float = 0.0,
+    apart: frozenset[int] = frozenset(),
+) -> tuple[float, int | None]:
+    """As :func:`contact_time`, and who is met first."""
     keep = (ego.t >= since - 1e-9) & (ego.t <= until + 1e-9)
-    t, boxes = ego.t[keep], _boxes(ego.poses[keep], ego.length - 2 * deeper, ego.width - 2 * deeper)
-    low, high = ego.poses[keep, :2].min(axis=0) - 10.0, ego.poses[keep, :2].max(axis=0) + 10.0
-    best = np.inf
-    for obstacle in [*scenario.static_obstacles, *scenario.dynamic_obstacles]:
-        if obstacle.obstacle_id in apart:
+    t, poses = ego.t[keep], ego.poses[keep]
+    length, width = max(ego.length - 2 * deeper, 0.01), max(ego.width - 2 * deeper, 0.01)
+    boxes = _boxes(poses, length, width)
+    best, who = np.inf, None
+    for obstacle in obstacles_of(scenario):
+        if obstacle.obstacle_id in apart or draws_a_trailer(obstacle):
             continue
-        prediction = getattr(obstacle, "prediction", None)
-        start = obstacle.initial_state
-        if prediction is None:
-            x, y = start.position
-            shapes = [_placed(obstacle.obstacle_shape, x, y, start.orientation)] * len(t)
-        elif getattr(prediction, "trajectory", None) is not None:
-            states = {s.time_step: s for s in (start, *prediction.trajectory.state_list)}
-            centres = np.array([s.position for s in states.values()])
-            if (centres.max(axis=0) < low).any() or (centres.min(axis=0) > high).any():
-                continue
-            shapes = _moving(states.values(), obstacle.obstacle_shape, first, scenario.dt, t)
+        time = _meets(obstacle, t, poses, boxes, np.hypot(length, width) / 2, first, scenario.dt)
+        if time < best:
+            best, who = time, obstacle.obstacle_id
+    return best, who
+
+
+def _meets(obstacle, t, poses, boxes, radius: float, first: int, dt: float) -> float:
+    """First of the times t at which the ego's boxes meet an obstacle."""
+    start, shape = getattr(obstacle, "initial_state", None), getattr(obstacle, "obstacle_shape", None)
+    regions = _regions(obstacle)
+    hits = np.zeros(len(t), dtype=bool)
+    if regions is not None:  # it holds at its step, and with the next one's between them
+        for step, region in regions:
+            near = np.abs(t / dt - (step - first)) < 1 - 1e-9
+            hits[near] |= shapely.intersects(boxes[near], region)
+    elif start is None or (getattr(obstacle, "prediction", None) is None and not _certain(start)):
+        region = _outline(shape if start is None else obstacle.occupancy_at_time(start.time_step).shape)
+        hits = shapely.intersects(boxes, region)
+    else:
+        if getattr(obstacle, "prediction", None) is None:
+            its = np.tile([*start.position[:2], start.orientation], (len(t), 1))
         else:
-            shapes = _stated(prediction.occupancy_set, first, scenario.dt, t)
-        there = np.array([s is not None for s in shapes])
-        if not there.any():
-            continue
-        hits = shapely.intersects(boxes[there], np.array([s for s in shapes if s is not None]))
-        if hits.any():
-            best = min(best, float(t[there][np.argmax(hits)]))
-    return best
+            its = _poses((start, *obstacle.prediction.trajectory.state_list), first, dt, t)
+        low_x, low_y, high_x, high_y = _outline(shape).bounds
+        reach = radius + 2 * np.hypot(max(-low_x, high_x), max(-low_y, high_y))
+        near = np.hypot(*(its[:, :2] - poses[:, :2]).T) <= reach  # not where it is not there: NaN
+        for piece in _placed(shape, its[near]) if near.any() else ():
+            hits[near] |= shapely.intersects(boxes[near], piece)
+    return float(t[np.argmax(hits)]) if hits.any() else np.inf
 
 
 def judged(result, file) -> float:

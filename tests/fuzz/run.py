@@ -9,22 +9,21 @@ from __future__ import annotations
 
 import errno
 import json
-import multiprocessing
 import os
 import random
 import sys
 import tempfile
-import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 from tests.fuzz import configs, mutate
+from tests.workers import answers
 
 __all__ = ["Case", "Outcome", "Settings", "fuzz", "run_case", "scenario_files", "table"]
 
@@ -37,7 +36,6 @@ _SLOTS = (
     *(("configuration", name) for name in CONFIGS),
     *(("solution file", name) for name in SOLUTIONS),
 )
-_MEMORY = 8 << 30  # address space of a worker [bytes]
 
 
 @dataclass(frozen=True)
@@ -235,89 +233,23 @@ def _keep(folder: Path, keep: Path, index: int) -> None:
             (keep / f"{index}-{path.name}").write_bytes(path.read_bytes())
 
 
-# -- workers ---------------------------------------------------------------------------------------
-
-
-def _serve(pipe: Any, settings: Settings) -> None:
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(quiet, 1)
-    os.dup2(quiet, 2)
-    try:
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-    except (ImportError, ValueError, OSError):  # no such limit here: the hard time limit remains
-        pass
-    import repair.api  # noqa: F401  not on the clock of the first input
-
-    pipe.send("ready")
-    while (index := pipe.recv()) is not None:
-        pipe.send(_outcome(index, settings))
-
-
-class _Worker:
-    """A process that can be asked, waited for, and replaced."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings, self.process, self.index = settings, None, None
-
-    def give(self, index: int) -> None:
-        if self.process is None:
-            context = multiprocessing.get_context("spawn")
-            self.pipe, theirs = context.Pipe()
-            self.process = context.Process(target=_serve, args=(theirs, self.settings), daemon=True)
-            self.process.start()
-            theirs.close()
-            self.pipe.recv()
-        self.pipe.send(index)
-        self.index, self.deadline = index, time.monotonic() + self.settings.limit
-
-    def collect(self) -> Outcome | None:
-        family, name = _SLOTS[self.index % len(_SLOTS)]
-        try:
-            if self.pipe.poll(0.05):
-                return self.pipe.recv()
-        except (EOFError, OSError):
-            self.process.join(5.0)
-            detail = f"the process ended with exit code {self.process.exitcode}"
-            self.process = None
-            return Outcome(self.index, family, name, BUG, detail)
-        if time.monotonic() < self.deadline:
-            return None
-        self.stop()
-        return Outcome(self.index, family, name, BUG, f"no answer within {self.settings.limit:g} s")
-
-    def stop(self) -> None:
-        if self.process is not None:
-            self.process.kill()
-            self.process.join(5.0)
-            self.process = None
+# -- many inputs ------------------------------------------------------------------------------------
 
 
 def fuzz(
     indices: Sequence[int], settings: Settings, on_outcome: Callable[[Outcome], None] = lambda _: None
 ) -> list[Outcome]:
     """Run the inputs of the given indices; outcomes in the order of the indices."""
-    waiting: Iterator[int] = iter(indices)
-    workers = [_Worker(settings) for _ in range(max(1, settings.jobs))]
+
+    def lost(index: int, why: str) -> Outcome:
+        family, name = _SLOTS[index % len(_SLOTS)]
+        return Outcome(index, family, name, BUG, why)
+
     found: list[Outcome] = []
-    try:
-        busy = [w for w, index in zip(workers, waiting, strict=False) if w.give(index) is None]
-        while busy:
-            for worker in list(busy):
-                outcome = worker.collect()
-                if outcome is None:
-                    continue
-                found.append(outcome)
-                on_outcome(outcome)
-                index = next(waiting, None)
-                if index is None:
-                    busy.remove(worker)
-                else:
-                    worker.give(index)
-    finally:
-        for worker in workers:
-            worker.stop()
+    work = partial(_outcome, settings=settings)
+    for outcome in answers(indices, work, lost, jobs=settings.jobs, limit=settings.limit):
+        found.append(outcome)
+        on_outcome(outcome)
     return sorted(found, key=lambda o: o.index)
 
 
