@@ -317,6 +317,17 @@ def test_unknown_recorded_obstacle_is_named(scene):
         make_reference(scene, ReferenceConfig(source="recorded", obstacle_id=424242), NOBODY)
 
 
+def test_those_that_could_be_meant_are_listed(scene):
+    """By their distance at the start; every one of them can be taken."""
+    with pytest.raises(ReferenceTrajectoryError, match=r"from near to far: 36, 337, ") as caught:
+        make_reference(scene, ReferenceConfig(source="recorded", obstacle_id=424242), NOBODY)
+    listed = str(caught.value).partition("near to far: ")[2].partition(" and ")[0].rstrip(")").split(", ")
+    at = [next(o for o in scene.obstacles if o.id == int(name)).states[0, :2] for name in listed]
+    ego = scene.initial_state
+    apart = [float(np.hypot(x - ego.x, y - ego.y)) for x, y in at]
+    assert apart == sorted(apart)
+
+
 def test_without_a_recorded_ego_the_key_is_named(scene):
     with pytest.raises(ReferenceTrajectoryError, match=r"reference\.obstacle_id"):
         make_reference(replace(scene, recorded_ego=None), ReferenceConfig(source="recorded"), NOBODY)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
     from repair.world.boxes import Occupancy
 
+_NAMED = 8  # so many obstacles are named in a sentence
+
 __all__ = [
     "known_until",
     "obstacle_positions",
@@ -96,12 +98,14 @@ def _recorded(scene: Scene, obstacle_id: int | None) -> Recording:
         if obstacle is None:
             raise ReferenceTrajectoryError(
                 f"{scene.id}: no obstacle is recorded as the ego itself; name one with reference.obstacle_id"
+                f"{_candidates(scene)}"
             )
     else:
         found = [o for o in (*scene.obstacles, scene.recorded_ego) if o is not None and o.id == obstacle_id]
         if not found:
             raise ReferenceTrajectoryError(
                 f"{scene.id}: there is no obstacle {obstacle_id} to take the reference from"
+                f"{_candidates(scene)}"
             )
         obstacle = found[0]
     what = f"{scene.id}: obstacle {obstacle.id}"
@@ -122,6 +126,21 @@ def _recorded(scene: Scene, obstacle_id: int | None) -> Recording:
     made = Recording(what, scene.initial_time_step, states[:last, :2], nothing, states[:last, 3], nothing)
     require_consistent(made, scene.dt)
     return made
+
+
+def _candidates(scene: Scene) -> str:
+    """Who moves from the planning problem's start on, those nearest to the ego first: in a bracket."""
+    ego = np.array([scene.initial_state.x, scene.initial_state.y])
+    moving = [
+        o for o in scene.obstacles
+        if o.role == "dynamic" and known_until(o.states[:, :2]) >= 4
+        and np.ptp(o.states[: known_until(o.states[:, :2]), :2], axis=0).max() > 1.0
+    ]  # fmt: skip
+    moving.sort(key=lambda o: float(np.hypot(*(o.states[0, :2] - ego))))
+    if not moving:
+        return " (none moves from the start on)"
+    more = f" and {len(moving) - _NAMED} more" if len(moving) > _NAMED else ""
+    return f" (those that move, from near to far: {', '.join(str(o.id) for o in moving[:_NAMED])}{more})"
 
 
 # -- solution files ----------------------------------------------------------------------------------
