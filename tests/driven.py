@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from commonroad.common.file_reader import CommonRoadFileReader
@@ -33,6 +34,7 @@ STEPS = (0.04, 0.1, 0.2, 0.5)
 MODELS = ("KS", "PM", "ST", "MB")
 NAME = "ZAM_Driven-1_1_T-1"
 _RADIUS = 30.0  # of the ring [m]
+LAP = 2.0 * np.pi * _RADIUS
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def centre_line(road: str) -> np.ndarray:
     return np.cumsum(np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
 
 
-def scenario_text(case: Case, start: tuple[float, float, float, float]) -> str:
+def scenario_text(case: Case, start: tuple[float, float, float, float], duration: float = 6.0) -> str:
     """The file: one wide road, an obstacle far from it that sets the horizon, the planning problem."""
     line = centre_line(case.road) + case.origin
     tangent = np.gradient(line, axis=0)
@@ -103,14 +105,14 @@ def scenario_text(case: Case, start: tuple[float, float, float, float]) -> str:
         road += f'<lanelet id="{name}">{bounds}{before}{after}</lanelet>'
     x, y, heading, speed = start
     far = np.array(case.origin) - 200.0
-    last = round(6.0 / case.dt)
+    last = round(duration / case.dt)
     parked = "".join(roads.state(*far, k=k, v=0.0, tag="state") for k in range(1, last + 1))
     obstacle = roads.car(30, roads.state(*far, v=0.0), f"<trajectory>{parked}</trajectory>")
     problem = roads.problem(100, roads.state(x, y, heading=heading, v=speed))
     return roads.scenario(road=road, obstacles=obstacle, problems=problem, dt=case.dt, name=NAME)
 
 
-def drive(case: Case) -> tuple[list, tuple[float, float, float, float]]:
+def drive(case: Case, duration: float = 6.0) -> tuple[list, tuple[float, float, float, float]]:
     """States of the case's model at the scenario's steps, and the planning problem's state."""
     rng = np.random.default_rng([case.seed, 7])
     dynamics = VehicleDynamics.from_model(VehicleModel[case.model], VehicleType(case.vehicle))
@@ -135,7 +137,7 @@ def drive(case: Case) -> tuple[list, tuple[float, float, float, float]]:
     x, _ = dynamics.state_to_array(begin)
     if case.model == "MB":
         x = np.asarray(dynamics.state_to_array(dynamics.convert_initial_state(begin))[0])
-    count = round((rng.uniform(1.5, 3.5) if case.manoeuvre == "short" else 6.0) / case.dt)
+    count = round((rng.uniform(1.5, 3.5) if case.manoeuvre == "short" else duration) / case.dt)
     rows, control = [x], _Driver(case, line + case.origin, rng, top)
     for k in range(max(count, 4)):
         following = control.follow(dynamics, rows[-1], k * case.dt)
@@ -171,9 +173,15 @@ class _Driver:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 made = dynamics.forward_simulation(np.array(x), u, self.case.dt, throw=False)
-            if made is not None:
+            if made is not None and self._moved(x, np.asarray(made), v):
                 return np.asarray(made)
         return None
+
+    def _moved(self, before: np.ndarray, after: np.ndarray, v: float) -> bool:
+        """Whether it is a motion at all: the multi-body model's integration may fail without a word."""
+        if not np.isfinite(after).all():
+            return False
+        return bool(np.hypot(*(after - before)[:2]) >= 0.4 * v * self.case.dt)
 
     def _acceleration(self, v: float, t: float) -> float:
         kind, dt = self.case.manoeuvre, self.case.dt
@@ -215,6 +223,8 @@ class _Driver:
         )
 
     def _point_mass(self, x: np.ndarray, v: float, a: float, share: float) -> np.ndarray:
+        if self.case.manoeuvre == "turn":  # to a standstill and off to the side, which no vehicle can
+            return np.array([-min(4.0, x[2] / self.case.dt), 1.0 if x[2] <= 1e-6 else 0.0])
         heading = float(np.arctan2(x[3], x[2])) if v > 0.0 else self._aim(x, v)[0]
         direction, distance = self._aim(x, v)
         error = (direction - heading + np.pi) % (2.0 * np.pi) - np.pi
@@ -232,16 +242,31 @@ def _disturbed(
     if not case.noise or case.model not in ("KS",) or abs(float(x[3])) < 0.5:
         return x
     made = np.array(x)
-    made[:2] += case.noise * rng.uniform(-0.02, 0.02, 2) * 0.2
-    made[4] += case.noise * rng.uniform(-0.03, 0.03) * 0.1
+    made[:2] += case.noise * rng.uniform(-0.01, 0.01, 2)
+    made[4] += case.noise * rng.uniform(-0.01, 0.01)
     return made
 
 
-def written(case: Case, folder) -> tuple:
-    """Paths of the scenario and of the solution file of a case."""
-    states, start = drive(case)
+def parameters(case: Case) -> Any:
+    """Of the case's vehicle."""
+    return VehicleDynamics.from_model(VehicleModel[case.model], VehicleType(case.vehicle)).parameters
+
+
+def written(
+    case: Case, folder, duration: float = 6.0, *, rows: np.ndarray | None = None, start: tuple | None = None
+) -> tuple:
+    """Paths of the scenario and of the solution file of a case.
+
+    ``rows`` (K, 5) are states x, y, steering, speed, heading to write instead of those that are driven, the
+    place that of the centre.
+    """
+    if rows is None:
+        states, start = drive(case, duration)
+    else:
+        dynamics = VehicleDynamics.from_model(VehicleModel[case.model], VehicleType(case.vehicle))
+        states = [dynamics.array_to_state(_at_axle(row, case), k) for k, row in enumerate(rows)]
     scenario, solution = folder / "scenario.xml", folder / "reference.xml"
-    scenario.write_text(scenario_text(case, start), encoding="utf-8")
+    scenario.write_text(scenario_text(case, start, duration), encoding="utf-8")
     made = PlanningProblemSolution(
         100,
         VehicleModel[case.model],
@@ -256,14 +281,22 @@ def written(case: Case, folder) -> tuple:
     return scenario, solution
 
 
+def _at_axle(row: np.ndarray, case: Case) -> np.ndarray:
+    """The model's own state, whose place is the rear axle's."""
+    rear = parameters(case).b
+    return np.array([row[0] - rear * np.cos(row[4]), row[1] - rear * np.sin(row[4]), *row[2:]])
+
+
 def official(scenario_file, solution_file) -> bool:
     """Whether CommonRoad's checks accept start and motion of a solution file."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("ignore")  # of its integrator and optimiser
         scenario, problems = CommonRoadFileReader(str(scenario_file)).open()
         solution = CommonRoadSolutionReader.open(str(solution_file))
+        if len(solution.planning_problem_solutions[0].trajectory.state_list) < 5:
+            return False
         try:
             starts_at_correct_state(solution, problems)
-        except Exception:
+            return all(found[0] for found in solution_feasible(solution, scenario.dt, problems).values())
+        except Exception:  # also of its own where it refuses the very first transition
             return False
-        return all(found[0] for found in solution_feasible(solution, scenario.dt, problems).values())

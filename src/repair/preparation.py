@@ -12,19 +12,27 @@ import numpy as np
 
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
+from repair.check.verdict import Reason
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
-from repair.problem.limits import resolve_limits
+from repair.problem.limits import reference_limits, resolve_limits
+from repair.reference.consistency import Recording
 from repair.reference.given import GivenReference, given_reference
-from repair.reference.recorded import known_until
-from repair.reference.registry import SOURCES, make_reference, positions_along, reference_notes
+from repair.reference.registry import (
+    SOURCES,
+    make_reference,
+    recording_of,
+    reference_notes,
+    track_along,
+)
 from repair.scene.reframe import as_ego, reframe
 from repair.scene.scene import Scene
 from repair.scene.settings import LOADING, SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
 from repair.situation import Situation
 from repair.timegrid import INSTANT, on_grid, steps_until
+from repair.vehicle.parameters import Vehicle
 from repair.world.occupancy import build_occupancy, shrink_to_start
 
 __all__ = ["Phases", "Prepared", "among", "laid_out", "prepare"]
@@ -32,6 +40,8 @@ __all__ = ["Phases", "Prepared", "among", "laid_out", "prepare"]
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
 _BODY_MARGIN = 0.1
+# What CommonRoad's drivability checker judges as well.
+_JUDGED = {Reason.KINEMATICS.value, Reason.LIMITS.value}
 
 
 @dataclass
@@ -94,9 +104,9 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     given = None
     if reference is not None:
         config, given = _with_given(config), given_reference(reference, scene)
-    positions = positions_along(scene, config.reference) if given is None else given.positions
-    if positions is not None:
-        scene = reframe(scene, positions[: known_until(positions)])
+    track = track_along(scene, config.reference) if given is None else given.track
+    if track is not None:
+        scene = reframe(scene, track.positions, track.heading)
         chosen = config.reference.obstacle_id
         if chosen is not None and SOURCES[config.reference.source].becomes_ego:
             scene = as_ego(scene, chosen)
@@ -140,7 +150,8 @@ def laid_out(
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset)
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
     with phases("checker"):
-        checker = Checker(scene, limits, config.checker, like)
+        allowed = [reference_limits(limits, config.limits, vehicle, accepted=told) for told in (False, True)]
+        checker = Checker(scene, limits, config.checker, allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
     with phases("reference"):
@@ -155,8 +166,16 @@ def laid_out(
     places = followed.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
     occupancy, more = shrink_to_start(occupancy, places, touching, offsets)
     with phases("conflict"):
-        conflict, _ = detect_conflict(followed, occupancy, checker, t_reference)
-    said = reference_notes(scene, followed)
+        conflict, verdict = detect_conflict(followed, occupancy, checker, t_reference)
+        recording = None
+        if reference is None or _JUDGED & set(verdict.reasons):
+            recording = recording_of(scene, config.reference) if given is None else given.recording
+        if recording is not None and recording.refused is not None and _JUDGED & set(verdict.reasons):
+            checker.take_word(recording.refused(), allowed[1])
+            conflict, again = detect_conflict(followed, occupancy, checker, t_reference)
+            if Reason.KINEMATICS.value in set(verdict.reasons) - set(again.reasons):
+                more = (*more, _accepted(recording, vehicle))
+    said = reference_notes(scene, followed, recording)
     wanted = config.repair.horizon
     if wanted is None:
         wanted = conflict.time + config.repair.after_conflict
@@ -181,6 +200,15 @@ def laid_out(
         config=config,
         phases=phases.seconds,
         given=given,
+    )
+
+
+def _accepted(recording: Recording, vehicle: Vehicle) -> str:
+    """That a reference is drivable for its own model only."""
+    driven = f"{vehicle.name or 'the vehicle'} of the kinematic single-track model"
+    return (
+        f"the reference is accepted by CommonRoad's checker for the model {recording.model}; {driven}, for "
+        "which solutions are written, cannot drive it everywhere"
     )
 
 

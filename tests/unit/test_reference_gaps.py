@@ -155,7 +155,7 @@ def test_whatever_commonroads_own_dynamics_drive_is_accepted(model, dt):
     from commonroad_dc.feasibility.feasibility_checker import state_transition_feasibility
     from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 
-    from repair.reference.recorded import _states
+    from repair.reference.recorded import states_of
     from repair.vehicle.parameters import load_vehicle
 
     number = int(model[2])
@@ -192,7 +192,7 @@ def test_whatever_commonroads_own_dynamics_drive_is_accepted(model, dt):
                 break
         if len(states) < 5:
             continue
-        recording = _states(states, "made", 0, vehicle)
+        recording = states_of(states, "made", 0, vehicle)
         consistency.require_consistent(recording, dt, vehicle)
 
 

@@ -105,14 +105,15 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
         allowed, margin = boxes_kept(content), prepared.config.checker.margin
         rows += clearance_rows(curve, prepared.occupancy, dt, t_end, allowed, margin)
-    rows += driven_rows(planned, prepared.limits, reference=curve is None)
+    judged = prepared.checker.reference_limits if curve is None else prepared.limits
+    rows += driven_rows(planned, judged, reference=curve is None)
     rows += physical_rows(states, dt, scene.vehicle)
     rows += contact_rows(prepared, ways, traffic, t_rep)
     road = road_rows(prepared, anew.scenario, ways)
     steps = first, first + steps_until(t_end, dt)
     name = str(anew.scenario.scenario_id)
     rows += [*road, *form_rows(solution, part, states, steps, name, scene.planning_problem_id, scene.vehicle)]
-    rows += start_rows(states, problem, scene.vehicle)
+    rows += start_rows(states, problem, scene.vehicle, given=prepared.config.reference.source == "file")
     rows += agreement_rows(states, planned, scene.vehicle, dt, first)
     rows += _record_rows(content, prepared, curve, states, traffic)
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.arrays import Array, Points, frozen, wrap
+from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.limits import Excess, curve_excess, plane_excess, surely_kept
+from repair.check.limits import Excess, curve_excess, plane_excess, speed_excess, surely_kept
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
@@ -25,9 +26,7 @@ from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.timegrid import INSTANT, steps_until
 from repair.vehicle.states import DrivenStates
-from repair.world.boxes import Occupancy
 from repair.world.collision import CollisionWorld, Contact
-from repair.world.occupancy import first_entry
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
@@ -54,14 +53,23 @@ class Checker:
     scene : Scene
     limits : Limits
     config : CheckerConfig
+    reference_limits : Limits, optional
+        Those of references; by default the same.
     like : Checker, optional
         Another one, whose edge of the road is taken over where road, vehicle and gap are the same.
     """
 
     def __init__(
-        self, scene: Scene, limits: Limits, config: CheckerConfig, like: Checker | None = None
+        self,
+        scene: Scene,
+        limits: Limits,
+        config: CheckerConfig,
+        reference_limits: Limits | None = None,
+        like: Checker | None = None,
     ) -> None:
         self.scene, self.limits, self.config = scene, limits, config
+        self.reference_limits = reference_limits or limits
+        self._refused: float | None = None
         self.world = CollisionWorld(scene.obstacles, scene.vehicle, scene.dt, scene.n_steps, config.substeps)
         before = None if like is None else like.edge
         self.edge: RoadEdge | None = road_edge(scene, config.road_gap, before) if config.road else None
@@ -119,11 +127,25 @@ class Checker:
         slip, orientation = self.scene.model.angles(path, slip0)
         found = self._limits(curve, after, problem, path)
         if self.config.margin:
-            found += self._margin(problem, curve, after)
+            found += boxes_entered(problem, curve, after, self.times(problem.t_end), self.config.substeps)
         found += self._clear(path, s, orientation, first, problem.t_rep)
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
+
+    def take_word(self, refused: float, limits: Limits) -> None:
+        """Leave the kinematics of references to CommonRoad's drivability checker, which was asked.
+
+        Parameters
+        ----------
+        refused : float
+            When it refuses the states as they were given [s]; inf if never.
+        limits : Limits
+            What it does not judge.
+        """
+        self._refused = refused
+        if refused == np.inf:
+            self.reference_limits = limits
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: by the same measure as a repair's, jerks apart."""
@@ -134,7 +156,11 @@ class Checker:
         if self.config.limits:
             found += self._reference_limits(reference, t_end)
         until = min((violation.time for violation in found), default=float("inf"))
-        return Verdict(tuple(found + self._kinematics(path, slip, orientation, until)))
+        if self._refused is None:
+            found += self._kinematics(path, slip, orientation, until)
+        elif self._refused < t_end - INSTANT:
+            found.append(Violation(Reason.KINEMATICS, self._refused, "refused as it was given"))
+        return Verdict(tuple(found))
 
     def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
         """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
@@ -171,10 +197,14 @@ class Checker:
         return path, motion[0], self._standing(path) if first == 0 else slip0
 
     def _standing(self, path: CartesianPath) -> float | None:
-        """Slip angle of a vehicle that stands at t = 0, by its orientation; None if it moves.
+        """Slip angle at t = 0 where the body's orientation is known; None for that of steady driving.
 
-        Of a path that stands the direction is held, so that it says nothing about the body's.
+        It is where a reference states it, and where the vehicle stands: of a path that stands the direction
+        is held, so that it says nothing about the body's.
         """
+        known = self.scene.first_heading
+        if known is not None and len(path.speed):
+            return float(wrap(path.heading[0] - known))
         if len(path.speed) and abs(float(path.speed[0])) < STANDSTILL:
             return float(wrap(path.heading[0] - self.scene.initial_state.orientation))
         return None
@@ -234,42 +264,6 @@ class Checker:
         index = self.road.first_off_road(left.real, left.imag, orientation[unsure])
         return None if index is None else int(unsure[index])
 
-    def _margin(self, problem: RepairProblem, curve: Curve, after: FrenetTrajectory) -> list[Violation]:
-        """The paper's detectCollision on the repaired part, at the scenario's steps."""
-        if not self._enters(problem.occupancy, after):
-            return []
-        samples = self.times(problem.t_end)[:: self.config.substeps]
-        samples = samples[samples >= problem.t_rep - INSTANT]
-        entry = first_entry(problem.occupancy, curve.sample(samples))
-        if entry is None:
-            return []
-        time = float(samples[entry[0]])
-        return [Violation(Reason.MARGIN, time, f"obstacle {problem.occupancy.ids[entry[1]]}")]
-
-    def _enters(self, occupancy: Occupancy, dense: FrenetTrajectory) -> bool:
-        """Whether a box may be entered at a scenario's step; False is certain.
-
-        Where the boxes are tabulated at these very steps there is nothing to interpolate.
-        """
-        n, count = self.config.substeps, len(dense)
-        first = round(float(dense.t[0]) / self.scene.dt * n) if count else 0
-        skip = -first % n
-        if not len(occupancy) or count <= skip:
-            return False
-        rows = slice((first + skip) // n, (first + count - 1) // n + 1)
-        t = occupancy.t[rows]
-        inner = dense.t[skip::n]
-        if len(t) != len(inner) or max(abs(t[0] - inner[0]), abs(t[-1] - inner[-1])) > 1e-9:
-            return True
-        lower, upper = occupancy.lower[:, rows], occupancy.upper[:, rows]
-        s, l = dense.position[skip::n].T  # noqa: E741
-        inside = (lower[..., 0] < s) & (s < upper[..., 0])
-        if not np.count_nonzero(inside):
-            return False
-        inside &= lower[..., 1] < l
-        inside &= l < upper[..., 1]
-        return bool(np.count_nonzero(inside))
-
     def _limits(
         self, curve: Curve, after: FrenetTrajectory, problem: RepairProblem, path: CartesianPath
     ) -> list[Violation]:
@@ -280,24 +274,14 @@ class Checker:
         broken = curve_excess(curve, problem.t_rep, problem.t_end, self.limits, slack)
         if not surely_kept(path, len(path.t) - len(after), self.limits, self.scene.vehicle):
             broken += plane_excess(curve, after, self.scene.frame, self.limits, self.scene.vehicle, slack)
-        if not broken:
-            return []
-        words = "; ".join(dict.fromkeys(excess.words for excess in broken))
-        return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
+        return _as_violation(broken)
 
     def _reference_limits(self, reference: Curve, t_end: float) -> list[Violation]:
         """Limits of speed and acceleration that the reference breaks; its jerk is nobody's claim."""
-        samples, limits, slack = reference.sample(self.times(t_end)), self.limits, self.config.tolerance
-        broken = plane_excess(reference, samples, self.scene.frame, limits, self.scene.vehicle, slack)
-        speed = np.abs(samples.velocity[:, 0])
-        if len(speed) and not float(speed.max()) <= limits.v_max * (1.0 + slack) + 1e-6:
-            fast = int(np.argmax(speed > limits.v_max * (1.0 + slack)))
-            words = f"speed {float(speed.max()):.2f} m/s of {limits.v_max:.2f}"
-            broken.append(Excess(float(samples.t[fast]), words))
-        if not broken:
-            return []
-        words = "; ".join(dict.fromkeys(excess.words for excess in broken))
-        return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
+        samples, scene = reference.sample(self.times(t_end)), self.scene
+        limits, slack = self.reference_limits, self.config.tolerance
+        broken = plane_excess(reference, samples, scene.frame, limits, scene.vehicle, slack)
+        return _as_violation(broken + speed_excess(samples, limits, slack))
 
     def _kinematics(
         self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
@@ -325,6 +309,14 @@ class Checker:
 
 
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
+
+
+def _as_violation(broken: list[Excess]) -> list[Violation]:
+    """Broken limits as one violation, from the first of them on."""
+    if not broken:
+        return []
+    words = "; ".join(dict.fromkeys(excess.words for excess in broken))
+    return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
 
 
 def _motion(trajectory: FrenetTrajectory, count: int) -> Array:

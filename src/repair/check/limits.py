@@ -24,7 +24,15 @@ from repair.scene.frame import FrenetFrame
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
-__all__ = ["ROUNDING", "Excess", "curve_excess", "plane_accelerations", "plane_excess", "surely_kept"]
+__all__ = [
+    "ROUNDING",
+    "Excess",
+    "curve_excess",
+    "plane_accelerations",
+    "plane_excess",
+    "speed_excess",
+    "surely_kept",
+]
 
 #: By how much rounding may move a number that is on its limit; the certificate reads curves to 1e-12.
 ROUNDING = 1e-6
@@ -87,6 +95,15 @@ def curve_excess(curve: Curve, t_from: float, t_end: float, limits: Limits, tole
         if not found:
             break
     return found
+
+
+def speed_excess(samples: FrenetTrajectory, limits: Limits, tolerance: float) -> list[Excess]:
+    """Speeds along the path beyond the limit at the samples."""
+    speed, most = np.abs(samples.velocity[:, 0]), limits.v_max * (1.0 + tolerance)
+    if not len(speed) or float(speed.max()) <= most + ROUNDING:
+        return []
+    words = f"speed {float(speed.max()):.2f} m/s of {limits.v_max:.2f}"
+    return [Excess(float(samples.t[int(np.argmax(speed > most))]), words)]
 
 
 @lru_cache(maxsize=64)
@@ -186,7 +203,11 @@ def _against(
     return (
         (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}"),
         (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}"),
-        (along / engine, 1.0, "needs {:.2f} of what the engine gives at that speed, {:.2f}"),
+        (
+            along / engine,
+            1.0 if math.isfinite(c.a_max) else math.inf,
+            "needs {:.2f} of what the engine gives at that speed, {:.2f}",
+        ),
         (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}"),
         (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}"),
     )

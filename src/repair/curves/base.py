@@ -11,7 +11,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.timegrid import INSTANT
 
-__all__ = ["Curve", "FrenetTrajectory", "Hulled", "SplicedCurve"]
+__all__ = ["Curve", "FrenetTrajectory", "Hulled", "SplicedCurve", "joined"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,12 @@ class FrenetTrajectory:
             self.t[keep], self.position[keep], self.velocity[keep],
             self.acceleration[keep], self.jerk[keep],
         )  # fmt: skip
+
+
+def joined(first: FrenetTrajectory, second: FrenetTrajectory) -> FrenetTrajectory:
+    """The samples of one after those of the other."""
+    names = ("t", "position", "velocity", "acceleration", "jerk")
+    return FrenetTrajectory(*(np.concatenate([getattr(first, n), getattr(second, n)]) for n in names))
 
 
 @runtime_checkable

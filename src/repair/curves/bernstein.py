@@ -17,9 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, frozen
-from repair.curves.base import FrenetTrajectory
+from repair.curves.base import FrenetTrajectory, joined
 from repair.curves.hulls import speed_hulls
 from repair.curves.sampling import DENSE, KEPT, evaluated, hold_ends
+
+_LARGEST = 1_000_000  # times * points up to which a curve is sampled at once
 
 __all__ = ["BernsteinCurve", "bernstein_basis", "derivative_map", "sampling_at"]
 
@@ -50,6 +52,22 @@ class BernsteinCurve:
     duration: float
     points: Array
 
+    @classmethod
+    def hermite(
+        cls, t_start: float, duration: float, position: npt.ArrayLike, velocity: npt.ArrayLike
+    ) -> BernsteinCurve:
+        """Cubic pieces with the given ends: constant acceleration where position and velocity agree on one.
+
+        Parameters
+        ----------
+        position, velocity : (M + 1, 2) array_like
+            ``[s, l]`` [m] and its rate [m/s] where the M pieces begin and end.
+        """
+        at, rate = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
+        arm = rate * (duration / 3.0)
+        ends = [at[:-1], at[:-1] + arm[:-1], at[1:] - arm[1:], at[1:]]
+        return cls(t_start, duration, frozen(np.stack(ends, axis=1)))
+
     @property
     def degree(self) -> int:
         """Degree n of the pieces."""
@@ -73,6 +91,9 @@ class BernsteinCurve:
         """Evaluate position and three derivatives; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         pieces, width, _ = self.points.shape
+        if len(times) * pieces * width > _LARGEST and len(times) > 1:  # long chains at many times: in parts
+            half = len(times) // 2
+            return joined(self.sample(times[:half]), self.sample(times[half:]))
         # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
         made = sampling_at if len(times) <= KEPT else sampling_at.__wrapped__
         matrix = made(times.tobytes(), float(self.t_start), pieces, width - 1, float(self.duration))

@@ -236,7 +236,7 @@ class Repairer:
             )  # fmt: skip
         if self._lanes is None:
             self._lanes, _ = lanes_of(scene.scenario.lanelet_network)
-        made = reframe(scene, positions, self._lanes)
+        made = reframe(scene, positions, lanes=self._lanes)
         self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
         self._framed, self._kept = made, None
         return made, self._checker

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from repair.problem.settings import LimitsConfig
 from repair.vehicle.transitions import POSITION_TOLERANCE
 
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
-__all__ = ["Limits", "resolve_limits"]
+__all__ = ["Limits", "reference_limits", "resolve_limits"]
 
 
 @dataclass(frozen=True)
@@ -89,4 +91,31 @@ def resolve_limits(config: LimitsConfig, vehicle: Vehicle, speed: float, dt: flo
         j_lon=min(config.j_lon, drivable),
         j_lat=config.j_lat,
         curvature=vehicle.largest_curvature(0.95),
+    )
+
+
+def reference_limits(usual: Limits, config: LimitsConfig, vehicle: Vehicle, *, accepted: bool) -> Limits:
+    """Limits by which a reference is judged: the vehicle's own where the configuration leaves them open.
+
+    A repair leaves a share of the friction circle unused; somebody else's reference need not. Below its
+    radius the engine's limit at each speed is judged beside these.
+
+    Parameters
+    ----------
+    usual : Limits
+        Those of repairs.
+    config : LimitsConfig
+    vehicle : Vehicle
+    accepted : bool
+        CommonRoad's drivability checker accepts the reference as it was given, which judges accelerations
+        itself, at the rear axle or the centre as the model has it. Those left open are then no limits.
+    """
+    open_ = np.inf if accepted else vehicle.a_max
+    total = open_ if config.a_total is None else config.a_total
+    return replace(
+        usual,
+        a_min=config.a_min if config.a_min is not None else -total,
+        a_max=config.a_max if config.a_max is not None else open_,
+        a_lat=config.a_lat if config.a_lat is not None else total,
+        a_total=total,
     )

@@ -10,7 +10,7 @@ may be off by what the strongest constant acceleration makes of a step.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,13 @@ class Recording:
         Of the body [rad]; NaN where that is not said.
     rear : float
         [m]; 0 for models whose motion is stated at the centre.
+    velocities : (K, 2) array or None
+        Of the centre [m/s], where the states say it.
+    model : str
+        The vehicle model whose states these are, as CommonRoad names it; empty where there is none.
+    refused : callable or None
+        The time [s] since the first row from which on CommonRoad's drivability checker refuses the states as
+        they were given, inf if it never does; None where there is nothing to ask it about.
     """
 
     what: str
@@ -72,6 +79,19 @@ class Recording:
     speeds: Array
     headings: Array
     rear: float = 0.0
+    velocities: Array | None = None
+    model: str = ""
+    refused: Callable[[], float] | None = None
+
+    def until(self, count: int) -> Recording:
+        """The first ``count`` rows."""
+        velocities = None if self.velocities is None else self.velocities[:count]
+        columns = self.positions, self.directions, self.speeds, self.headings
+        positions, directions, speeds, headings = (column[:count] for column in columns)
+        return replace(
+            self, positions=positions, directions=directions, speeds=speeds, headings=headings,
+            velocities=velocities,
+        )  # fmt: skip
 
 
 def require_consistent(recording: Recording, dt: float, vehicle: Vehicle | None = None) -> None:

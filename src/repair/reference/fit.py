@@ -1,4 +1,4 @@
-"""A spline through recorded positions, from the first to the last of them and not beyond."""
+"""Curves through states that were driven before, from the first to the last of them and not beyond."""
 
 from __future__ import annotations
 
@@ -6,41 +6,44 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, wrap
+from repair.curves.base import Curve
 from repair.curves.bases import basis_matrix, n_points_for
+from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import splice_points
 from repair.errors import ReferenceTrajectoryError
 from repair.scene.road.passes import along
 
 if TYPE_CHECKING:
+    from repair.reference.consistency import Recording
     from repair.scene.scene import Scene
 
-__all__ = ["fit_positions"]
+__all__ = ["between_steps", "deviation", "fit_recording"]
 
 _DEGREE = 3
 _SPACING = 0.4  # knots of a spline through recorded positions are at most this far apart [s], or two steps
 _SPEED_OFF = 0.05  # a recording that starts faster or slower than the ego by more has its own speed [m/s]
 _FIT_OFF = 0.05  # a spline farther from the positions than this [m] gets more freedom
+_ROUGH = 2.0  # an acceleration that changes by more within a step comes from rounding [m/s²]
+_DENSE = 0.5  # positions between the steps are at most this far apart [m]
+_PARTS = 4  # of a step, at whose ends a curve is looked at
 
 
-def fit_positions(
-    scene: Scene, positions: Array, speeds: Array, what: str, *, noisy: bool = False
-) -> UniformBSpline:
-    """Spline through recorded centre positions.
+def fit_recording(scene: Scene, recording: Recording, *, noisy: bool = False) -> Curve:
+    """Curve through what was driven; it ends with the last state.
 
-    It ends at the last position: its knots are spread over the recording's own duration. It starts with the
-    scene's state, or with the recording's own speed where that differs.
+    Where the velocities are known, it goes through positions and velocities alike, cubic from step to step,
+    which is exact for constant accelerations. Where the vehicle cannot follow that, because the states were
+    rounded or are those of another model, and wherever only positions are known, it is a smoothing spline
+    that starts with the scene's state, or with the recording's own speed where that differs; its knots are
+    spread over the recording's own duration.
 
     Parameters
     ----------
     scene : Scene
-    positions : (K, 2) array
-        At the scenario's steps [m].
-    speeds : (K,) array
-        Those recorded [m/s]; NaN where unknown.
-    what : str
-        Name of the recording, for sentences.
+    recording : Recording
+        At the scenario's steps.
     noisy : bool
         The positions were measured: no knots are added to follow them more closely.
 
@@ -49,6 +52,7 @@ def fit_positions(
     ReferenceTrajectoryError
         If there are less than four positions, or they leave the neighbourhood of the route.
     """
+    positions, what = recording.positions, recording.what
     last = len(positions)
     if last < 4:
         raise ReferenceTrajectoryError(f"{what} is known for {last} steps only; a reference takes at least 4")
@@ -57,8 +61,94 @@ def fit_positions(
         raise ReferenceTrajectoryError(
             f"{what} leaves the neighbourhood of the route and cannot be a reference"
         )
+    if recording.velocities is None:
+        return _smooth(scene, recording, coordinates, noisy=noisy)[0]
+    exact = BernsteinCurve.hermite(
+        0.0, scene.dt, coordinates, _in_frame(scene, coordinates, recording.velocities)
+    )
+    first = _drivable_until(scene, exact)
+    within = exact.derivative_points(2)[..., 0]
+    rough = float(np.abs(np.diff(within, axis=1)).max()) > _ROUGH
+    if rough or np.isfinite(first):
+        smooth, off = _smooth(scene, recording, coordinates)
+        then = _drivable_until(scene, smooth) if off <= _FIT_OFF else 0.0
+        if then > first or (rough and then == first):
+            return smooth
+    return exact
+
+
+def between_steps(recording: Recording, dt: float) -> Array:
+    """Positions (M, 2) [m], also between the steps where the velocities are known."""
+    if recording.velocities is None or len(recording.positions) < 2:
+        return recording.positions
+    chain = BernsteinCurve.hermite(0.0, dt, recording.positions, recording.velocities)
+    farthest = float(np.hypot(*recording.velocities.T).max()) * dt
+    count = int(np.clip(np.ceil(farthest / _DENSE), 1, 100))
+    return chain.sample(np.arange((len(recording.positions) - 1) * count + 1) * (dt / count)).position
+
+
+def deviation(scene: Scene, recording: Recording, curve: Curve) -> tuple[float, float, float]:
+    """By how much a curve misses what was recorded at the steps: place [m], speed [m/s], orientation [rad].
+
+    Speed and orientation are those where the recording states them, and 0 where it does not.
+    """
+    count = len(recording.positions)
+    path = scene.frame.cartesian(curve.sample(np.arange(count) * scene.dt))
+    off = float(np.abs(path.xy - recording.positions).max())
+    faster = turned = 0.0
+    if recording.velocities is not None:
+        faster = float(np.abs(np.abs(path.speed) - np.hypot(*recording.velocities.T)).max())
+    known = np.isfinite(recording.headings)
+    if known.any():
+        turned = float(np.abs(wrap(_orientation(scene, curve, count) - recording.headings))[known].max())
+    return off, faster, turned
+
+
+def _in_frame(scene: Scene, coordinates: Array, velocities: Array) -> Array:
+    """Velocities (K, 2) in the plane as rates of ``[s, l]``."""
+    s, l = coordinates.T  # noqa: E741
+    heading = scene.frame.heading(s)
+    cos, sin = np.cos(heading), np.sin(heading)
+    x, y = velocities.T
+    return np.stack([(cos * x + sin * y) / (1.0 - scene.frame.curvature(s) * l), cos * y - sin * x], axis=1)
+
+
+def _orientation(scene: Scene, curve: Curve, count: int) -> Array:
+    """Of the body that drives along a curve, at the steps (count,) [rad]."""
+    times = np.arange((count - 1) * _PARTS + 1) * (scene.dt / _PARTS)
+    path = scene.frame.cartesian(curve.sample(times))
+    _, orientation = scene.model.angles(path, _first_slip(scene, float(path.heading[0])))
+    return orientation[::_PARTS]
+
+
+def _first_slip(scene: Scene, heading: float) -> float | None:
+    known = scene.first_heading
+    return None if known is None else float(wrap(heading - known))
+
+
+def _drivable_until(scene: Scene, curve: Curve) -> float:
+    """When the scene's vehicle leaves a curve because it cannot drive it, or has not the grip [s]; or inf."""
+    steps = round((curve.t_end - curve.t_start) / scene.dt)
+    times = np.arange(steps * _PARTS + 1) * (scene.dt / _PARTS)
+    path = scene.frame.cartesian(curve.sample(times))
+    slip, orientation = scene.model.angles(path, _first_slip(scene, float(path.heading[0])))
+    found = scene.model.first_undrivable(
+        times[::_PARTS], path.xy[::_PARTS], path.speed[::_PARTS], slip[::_PARTS], orientation[::_PARTS],
+        scene.dt, "leftover", np.inf,
+    )  # fmt: skip
+    velocity = path.speed[:, None] * np.stack([np.cos(path.heading), np.sin(path.heading)], axis=1)
+    grip = np.hypot(*np.diff(velocity, axis=0).T) * (_PARTS / scene.dt)
+    slides = np.flatnonzero(grip > scene.vehicle.a_max)
+    until = float(times[slides[0]]) if len(slides) else np.inf
+    return until if found is None else min(found[0], until)
+
+
+def _smooth(
+    scene: Scene, recording: Recording, coordinates: Array, *, noisy: bool = False
+) -> tuple[UniformBSpline, float]:
+    """Smoothing spline through ``[s, l]`` (K, 2) at the steps, and by how much it misses them [m]."""
     state = np.array([coordinates[0], scene.start[1], scene.start[2]])
-    own = float(speeds[0]) if np.isfinite(speeds[0]) else state[1, 0]
+    own = float(recording.speeds[0]) if np.isfinite(recording.speeds[0]) else state[1, 0]
     if np.linalg.norm(coordinates[0] - scene.start[0]) > 0.5:
         state[1] = (coordinates[1] - coordinates[0]) / scene.dt
         state[2] = 0.0
@@ -72,7 +162,7 @@ def fit_positions(
         made, miss = _fitted(coordinates, state[:fixed], scene.dt, finer)
         if miss < off:
             best, off = made, miss
-    return best
+    return best, off
 
 
 def _fitted(coordinates: Array, state: Array, dt: float, spacing: float) -> tuple[UniformBSpline, float]:

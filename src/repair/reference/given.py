@@ -16,6 +16,7 @@ from repair.arrays import Array, column
 from repair.curves.base import Curve
 from repair.curves.codec import curve_to_dict, read_curve
 from repair.errors import ReferenceTrajectoryError, foreign
+from repair.reference.base import Track
 from repair.reference.columns import KEYS, WHAT, at_steps, require_times, table_of
 from repair.reference.consistency import (
     START_OFF,
@@ -24,7 +25,7 @@ from repair.reference.consistency import (
     require_consistent,
     require_start,
 )
-from repair.reference.fit import fit_positions
+from repair.reference.fit import fit_recording
 from repair.reference.recorded import states_of
 from repair.scene.scene import InitialState
 from repair.timegrid import steps_until
@@ -61,6 +62,11 @@ class GivenReference:
         """Positions (K, 2) along which the frame has to run [m]; None where it stays as it is."""
         return None if self.recording is None else self.recording.positions
 
+    @property
+    def track(self) -> Track | None:
+        """The same as a track."""
+        return None if self.positions is None else Track(self.positions)
+
     def curve(self, scene: Scene) -> Curve:
         """The reference in the scene's frame.
 
@@ -72,8 +78,7 @@ class GivenReference:
         if self.recording is None:
             assert self.path is not None
             return self.path
-        made = self.recording
-        return fit_positions(scene, made.positions, made.speeds, made.what)
+        return fit_recording(scene, self.recording)
 
 
 def given_reference(thing: Any, scene: Scene) -> GivenReference:
@@ -233,6 +238,7 @@ def _of_trajectory(trajectory: Any, scene: Scene) -> GivenReference:
     """A CommonRoad trajectory: its states are looked at as those of a solution file are."""
     with foreign("reading the given trajectory", ReferenceTrajectoryError):
         made = states_of(list(trajectory.state_list), WHAT, scene.initial_time_step, scene.vehicle)
+        made = replace(made, velocities=None)  # result.json, which is read again, has columns t to v
     _require_start(made, scene)
     require_consistent(made, scene.dt, scene.vehicle)
     table = [np.arange(len(made.positions)) * scene.dt, *made.positions.T, made.headings, made.speeds]

@@ -7,18 +7,23 @@ the ego's are errors that name the first place. What ends early is a reference u
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from repair.arrays import Array
-from repair.curves.bspline import UniformBSpline
+from repair.arrays import Array, wrap
+from repair.curves.base import Curve
+from repair.curves.plane import STANDSTILL
 from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError
-from repair.reference.consistency import Recording, require_consistent, require_start
-from repair.reference.fit import fit_positions
+from repair.reference.base import Track
+from repair.reference.consistency import START_HEADING_OFF, Recording, require_consistent, require_start
+from repair.reference.fit import between_steps, fit_recording
 from repair.reference.settings import ReferenceConfig
+from repair.vehicle.accepted import first_refused
 from repair.vehicle.parameters import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
@@ -31,8 +36,9 @@ __all__ = [
     "known_until",
     "obstacle_positions",
     "recorded_reference",
-    "solution_positions",
+    "solution_recording",
     "solution_reference",
+    "solution_track",
     "states_of",
 ]
 
@@ -48,8 +54,8 @@ def obstacle_positions(scene: Scene, config: ReferenceConfig) -> Array:
     return _padded(scene, _recorded(scene, config.obstacle_id))
 
 
-def solution_positions(scene: Scene, config: ReferenceConfig) -> Array:
-    """Centre positions (T, 2) in a solution file at the scenario's steps.
+def solution_recording(scene: Scene, config: ReferenceConfig) -> Recording:
+    """What a solution file holds, at the scenario's steps.
 
     Raises
     ------
@@ -57,28 +63,48 @@ def solution_positions(scene: Scene, config: ReferenceConfig) -> Array:
         If there is no such file, it is of another scenario, or its states have a gap, contradict each other
         or do not start with the ego.
     """
-    return _padded(scene, _from_solution(scene, config.file))
+    return _from_solution(scene, config.file).until(scene.n_steps + 1)
 
 
-def recorded_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
+def solution_track(scene: Scene, config: ReferenceConfig) -> Track:
+    """Where a solution file leads, and with which orientation it begins; raises as above."""
+    made = solution_recording(scene, config)
+    heading = float(made.headings[0])
+    if not np.isfinite(heading):
+        heading = _first_heading(made, scene)
+    return Track(between_steps(made, scene.dt), heading)
+
+
+def _first_heading(made: Recording, scene: Scene) -> float:
+    """Orientation of a body at the start whose centre is a point mass [rad]: as in steady driving.
+
+    It stays as near to the planning problem's as CommonRoad asks for.
+    """
+    usual, velocities = scene.initial_state.orientation, made.velocities
+    if velocities is None or len(velocities) < 2 or not np.hypot(*velocities[0]) > STANDSTILL:
+        return usual
+    (x, y), (a, b) = velocities[0], (velocities[1] - velocities[0]) / scene.dt
+    bend = scene.vehicle.rear * (x * b - y * a) / np.hypot(x, y) ** 3
+    heading = float(np.arctan2(y, x) - np.arcsin(np.clip(bend, -0.95, 0.95)))
+    most = 0.9 * START_HEADING_OFF
+    return usual + float(np.clip(wrap(heading - usual), -most, most))
+
+
+def recorded_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
     """A spline through the positions of a recorded obstacle, until its last one."""
-    return _fitted(scene, _recorded(scene, config.obstacle_id), noisy=True)
+    made = _recorded(scene, config.obstacle_id)
+    return fit_recording(scene, made.until(scene.n_steps + 1), noisy=True)
 
 
-def solution_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
-    """A spline through the positions in a solution file, until the last one."""
-    return _fitted(scene, _from_solution(scene, config.file))
+def solution_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
+    """A curve through the states in a solution file, until the last one."""
+    return fit_recording(scene, solution_recording(scene, config))
 
 
 def known_until(positions: Array) -> int:
     """Number of leading positions (T, 2) without a gap."""
     known = np.asarray(np.isfinite(positions).all(axis=1))
     return len(known) if known.all() else int(np.argmin(known))
-
-
-def _fitted(scene: Scene, recording: Recording, *, noisy: bool = False) -> UniformBSpline:
-    positions = recording.positions[: scene.n_steps + 1]
-    return fit_positions(scene, positions, recording.speeds, recording.what, noisy=noisy)
 
 
 def _padded(scene: Scene, recording: Recording) -> Array:
@@ -171,7 +197,15 @@ def _from_solution(scene: Scene, file: str | None) -> Recording:
     start = scene.initial_state
     require_start(made, start.x, start.y, start.orientation, start.velocity)
     require_consistent(made, scene.dt, vehicle)
-    return made
+    refused = partial(_refused, matching[0], scene.dt)
+    return replace(made, refused=refused, model=str(matching[0].vehicle_model.name))
+
+
+def _refused(solution: Any, dt: float) -> float:
+    """When CommonRoad's checker refuses the states of a solution in their own model [s]; inf if never."""
+    states, model = list(solution.trajectory.state_list), str(solution.vehicle_model.name)
+    transition = first_refused(states, model, int(solution.vehicle_type.value), dt)
+    return np.inf if transition is None else transition * dt
 
 
 def _vehicle_of(solution: Any, usual: Vehicle) -> Vehicle:
@@ -210,7 +244,17 @@ def states_of(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Rec
     rows = np.array([_motion_of(state) for state in states], dtype=np.float64)
     positions = np.array([state.position for state in states], dtype=np.float64)
     behind = vehicle.rear if hasattr(states[0], "orientation") and not _slips(states[0]) else 0.0
-    return Recording(what, first, positions, rows[:, 0], rows[:, 1], rows[:, 2], behind)
+    velocities = _velocities(states, rows, vehicle, behind)
+    return Recording(what, first, positions, rows[:, 0], rows[:, 1], rows[:, 2], behind, velocities)
+
+
+def _velocities(states: list[Any], rows: Array, vehicle: Vehicle, behind: float) -> Array:
+    """Velocities (K, 2) of the centre [m/s]; ``rows`` as in :func:`_motion_of`."""
+    direction, speed = np.nan_to_num(rows[:, 0]), rows[:, 1]
+    cos, sin = np.cos(direction), np.sin(direction)
+    steering = np.array([float(getattr(state, "steering_angle", None) or 0.0) for state in states])
+    across = behind * speed * np.tan(steering) / vehicle.wheelbase  # the body turns about the rear axle
+    return np.stack([speed * cos - across * sin, speed * sin + across * cos], axis=1)
 
 
 def _slips(state: Any) -> bool:

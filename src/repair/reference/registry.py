@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from repair.arrays import Array
+import numpy as np
+
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ReferenceTrajectoryError, foreign
-from repair.reference.base import Along, MakeReference, ReferenceSource
+from repair.reference.base import Along, AsRecorded, MakeReference, ReferenceSource, Track
+from repair.reference.fit import deviation
+from repair.reference.recorded import known_until
 from repair.registry import Registry, loaded
 from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
+    from repair.reference.consistency import Recording
     from repair.reference.settings import ReferenceConfig
     from repair.scene.scene import Scene
     from repair.world.boxes import Occupancy
 
-__all__ = ["SOURCES", "make_reference", "positions_along", "reference_notes", "register"]
+__all__ = ["SOURCES", "make_reference", "recording_of", "reference_notes", "register", "track_along"]
 
+_FOLLOWED = (1e-3, 1e-2, 2e-3)  # what is followed to within less than this is followed [m], [m/s], [rad]
 _SPEED_OFF = 0.05  # a start this much faster or slower than the planning problem's is said [m/s]
 
 SOURCES: Registry[ReferenceSource] = Registry(
@@ -38,7 +43,8 @@ SOURCES: Registry[ReferenceSource] = Registry(
         ),
         "file": ReferenceSource(
             "repair.reference.recorded:solution_reference",
-            "repair.reference.recorded:solution_positions",
+            "repair.reference.recorded:solution_track",
+            "repair.reference.recorded:solution_recording",
             says="a CommonRoad solution file, reference.file",
         ),
         "given": ReferenceSource(
@@ -68,8 +74,8 @@ def register(name: str, source: ReferenceSource | MakeReference) -> None:
     SOURCES.register(name, source if isinstance(source, ReferenceSource) else ReferenceSource(source))
 
 
-def positions_along(scene: Scene, config: ReferenceConfig) -> Array | None:
-    """The positions along which the scene's frame has to run; None where it runs along the route.
+def track_along(scene: Scene, config: ReferenceConfig) -> Track | None:
+    """Where the scene's frame has to run; None where it runs along the route.
 
     Raises
     ------
@@ -78,7 +84,23 @@ def positions_along(scene: Scene, config: ReferenceConfig) -> Array | None:
     """
     along: Along | str | None = SOURCES[config.source].along
     with foreign(f"reference source {config.source!r}", ReferenceTrajectoryError):
-        return None if along is None else loaded(along)(scene, config)
+        found = None if along is None else loaded(along)(scene, config)
+    if found is None or isinstance(found, Track):
+        return found
+    return Track(found[: known_until(found)])
+
+
+def recording_of(scene: Scene, config: ReferenceConfig) -> Recording | None:
+    """The states that the reference is made from; None where it is not made from states.
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        If the source has none; the sentence says what is missing.
+    """
+    recording: AsRecorded | str | None = SOURCES[config.source].recording
+    with foreign(f"reference source {config.source!r}", ReferenceTrajectoryError):
+        return None if recording is None else loaded(recording)(scene, config)
 
 
 def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
@@ -104,8 +126,16 @@ def make_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) 
     return curve
 
 
-def reference_notes(scene: Scene, curve: Curve) -> tuple[str, ...]:
-    """What has to be said about a reference: until when it is known, and a start unlike the ego's."""
+def reference_notes(scene: Scene, curve: Curve, recording: Recording | None = None) -> tuple[str, ...]:
+    """What has to be said about a reference: until when it is known, and where it is not what was given.
+
+    Parameters
+    ----------
+    scene : Scene
+    curve : Curve
+    recording : Recording, optional
+        What it was made from.
+    """
     notes = []
     own, given = float(curve.sample([curve.t_start]).velocity[0, 0]), float(scene.start[1, 0])
     if abs(own - given) > _SPEED_OFF:
@@ -115,4 +145,10 @@ def reference_notes(scene: Scene, curve: Curve) -> tuple[str, ...]:
             f"the reference ends at {curve.t_end:g} s, and so does what is said about it "
             f"(the scenario goes on until {scene.horizon:g} s)"
         )
+    if recording is not None:
+        off = deviation(scene, recording, curve)
+        if any(np.greater(off, _FOLLOWED)):
+            notes.append(
+                f"the reference is followed to within {off[0]:.2g} m, {off[1]:.2g} m/s and {off[2]:.2g} rad"
+            )
     return tuple(notes)

@@ -25,8 +25,13 @@ _JOIN_SLOPE = 5.0  # so many metres for each metre that it lies beside the route
 _JOIN = 15.0  # length over which the recorded path runs into the route again [m]
 
 
-def reframe(scene: Scene, positions: Array, lanes: Mapping[int, Lane] | None = None) -> Scene:
-    """Lay the frame along recorded centre positions (T, 2), then on along the old frame.
+def reframe(
+    scene: Scene,
+    positions: Array,
+    heading: float | None = None,
+    lanes: Mapping[int, Lane] | None = None,
+) -> Scene:
+    """Lay the frame along recorded centre positions (M, 2), then on along the old frame.
 
     Where the recording ends across the route or against it, the frame goes straight on instead: a path back
     to the route would fold, and places on it would have two coordinates.
@@ -37,11 +42,14 @@ def reframe(scene: Scene, positions: Array, lanes: Mapping[int, Lane] | None = N
     Parameters
     ----------
     scene : Scene
-    positions : (T, 2) array
-        [m]; of fewer than four different ones no path is made, and the scene stays as it is.
+    positions : (M, 2) array
+        [m]; of fewer than four different ones no path is made, and the frame stays as it is.
+    heading : float, optional
+        Orientation of the recorded body at the start [rad].
     lanes : mapping, optional
         Those of the scene's map, where they are known already.
     """
+    scene = scene if heading is None else replace(scene, first_heading=heading)
     path = [positions[0]]
     for point in positions[1:]:
         if np.hypot(*(point - path[-1])) >= _SPACING:

@@ -96,6 +96,9 @@ class Scene:
         What the scene was loaded with.
     modes : tuple of Mode
         Of obstacles that were given several predictions (:func:`repair.with_traffic`).
+    first_heading : float or None
+        Orientation of the body at t = 0 [rad] where a reference states it; None for that of steady driving
+        along the frame.
     """
 
     id: str
@@ -124,6 +127,7 @@ class Scene:
     planning_problem: Any
     settings: SceneConfig = field(default_factory=SceneConfig)
     modes: tuple[Mode, ...] = ()
+    first_heading: float | None = None
 
     def __repr__(self) -> str:
         return (
