@@ -304,3 +304,20 @@ def test_the_written_heading_is_in_the_same_turn(heading: float, backend: str, t
     assert written[0] == pytest.approx(heading, abs=1e-3)
     assert max(abs(h) for h in written) <= TURN
     accepted(result, file, tmp_path / "out")
+
+
+# -- neighbours whose common outline crosses itself ----------------------------------------------------
+
+
+@pytest.mark.parametrize("begin", [20.0, 110.0, 200.0, 300.0])
+def test_a_lane_is_road_whatever_its_neighbours_enclose(begin: float, load: Load) -> None:
+    """The neighbour to the left ends on the right, so that the ring around both crosses itself."""
+    x = list(range(0, 401, 20))
+    other = [4.0 - 12.0 * a / 400.0 for a in x]
+    road = roads.lanelet(1, x, [0.0] * 21, width=4.0, more='<adjacentLeft ref="2" drivingDir="same"/>')
+    road += roads.lanelet(2, x, other, width=4.0, more='<adjacentRight ref="1" drivingDir="same"/>')
+    scene = load(
+        roads.scenario(road=road, obstacles="", problems=roads.problem(start=roads.state(begin, 0.0))),
+        horizon=5.0,
+    )
+    assert conflict(scene).kind == "none"

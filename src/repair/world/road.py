@@ -63,8 +63,7 @@ class RoadBoundary:
 
         self._scenario = scenario
         self._corners = vehicle.corners
-        outlines = [shapely.Polygon(o) for o in _section_outlines(scenario.lanelet_network) if len(o) > 2]
-        self.region = shapely.union_all([p if p.is_valid else p.buffer(0) for p in outlines])
+        self.region = shapely.union_all(_outlines(scenario.lanelet_network))
         if gap > 0.0:
             self.region = _closed(self.region, gap)
         shapely.prepare(self.region)
@@ -213,11 +212,30 @@ def grouping(count: int, size: int) -> npt.NDArray[np.intp]:
     return by_place
 
 
-def _section_outlines(network: Any) -> list[Array]:
-    """Outline (V, 2) of every lane section: a lanelet with its lateral neighbours, right to left."""
+def _outlines(network: Any) -> list[Any]:
+    """What is road as drawn: the sections, and each lanelet of those whose outline crosses itself.
+
+    Where neighbours differ in length or bend away from each other the ring around them may cross itself, and
+    what it encloses is then no longer all of them.
+    """
+    import shapely
+
+    found = []
+    for members, outline in _sections(network):
+        section = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
+        found.append(section if section.is_valid else section.buffer(0))
+        if not section.is_valid:
+            lanes = [network.find_lanelet_by_id(member) for member in members]
+            rings = [np.concatenate([x.left_vertices, x.right_vertices[::-1]])[:, :2] for x in lanes]
+            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
+    return found
+
+
+def _sections(network: Any) -> list[tuple[list[int], Array]]:
+    """Every lane section, a lanelet with its lateral neighbours: who is in it, and its outline (V, 2)."""
     lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
     left_over = dict.fromkeys(lanelets)
-    outlines = []
+    found = []
     while left_over:
         first, _ = left_over.popitem()
         start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
@@ -228,8 +246,9 @@ def _section_outlines(network: Any) -> list[Array]:
         lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
         ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
         starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
-        outlines.append(np.concatenate((lines[0], ends, lines[-1][::-1], starts)))
-    return outlines
+        outline = np.concatenate((lines[0], ends, lines[-1][::-1], starts))
+        found.append(([member for member, _ in chain], outline))
+    return found
 
 
 def _neighbours(
