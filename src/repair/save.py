@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from repair.bounds.latest import Bound
+from repair.bounds.written import PROOF_FILE, proof_bytes
 from repair.errors import OutputError, foreign
 from repair.io.commonroad import no_solution_because, scenario_bytes, to_solution
 from repair.io.files import write_files
@@ -126,6 +127,14 @@ def scenario_file(result: Saved) -> Files:
     )
 
 
+def proof_file(result: Saved) -> Files:
+    """The proofs of the bounds, where there are any."""
+    said = result.outcome.record.get("bound")
+    if not any(bound.proven for bound in result.bounds.values()) or said is None:
+        return Files({}, {}, (PROOF_FILE,))
+    return Files({PROOF_FILE: proof_bytes(result.bounds)}, {"bound": {**said, "proof_file": PROOF_FILE}})
+
+
 FORMATS: Registry[Format] = Registry(
     "output format",
     {
@@ -133,6 +142,7 @@ FORMATS: Registry[Format] = Registry(
         "figures": figure_files,
         "scenario": scenario_file,
         "drawing": drawing_file,
+        "proof": proof_file,
     },
     error=OutputError,
     group="repair.formats",

@@ -107,7 +107,7 @@ def test_the_earliest_is_found_whatever_it_is(last):
         assert len(set(asked)) == len(asked)
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5, 8, 9])
+@pytest.mark.parametrize("seed", [4, 5, 8, 10, 11])
 def test_no_motion_is_found_at_or_after_a_bound(tmp_path, seed):
     """Traffic of any shape, speed and step; direct shooting knows nothing of the proof."""
     situation = prepared(tmp_path, crossing(seed).text)

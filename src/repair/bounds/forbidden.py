@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array
 
-__all__ = ["SPAN", "forbidden", "meets_throughout"]
+__all__ = ["SPAN", "forbidden", "meets_throughout", "pieces"]
 
 #: Intervals of headings are looked at in pieces no longer than this [rad].
 SPAN = 0.2
@@ -42,9 +42,7 @@ def forbidden(shape: Array, corners: Array, low: float, high: float) -> Array | 
     (V, 2) array or None
         Anticlockwise; None where nothing was found.
     """
-    high = min(high, low + 2.0 * math.pi)
-    count = max(1, math.ceil((high - low) / SPAN))
-    angles = np.linspace(low, high, count + 1)
+    angles = np.linspace(low, high, pieces(low, high) + 1)
     polygon = _around(shape, corners, angles)
     if len(polygon) < _FEWEST:
         return None
@@ -59,6 +57,11 @@ def forbidden(shape: Array, corners: Array, low: float, high: float) -> Array | 
             break
     points = points[~open_]
     return _hull(points) if len(points) >= _FEWEST else None
+
+
+def pieces(low: float, high: float) -> int:
+    """In how many pieces an interval of headings is looked at."""
+    return max(1, math.ceil((high - low) / SPAN))
 
 
 def meets_throughout(points: Array, shape: Array, corners: Array, angles: Array) -> npt.NDArray[np.bool_]:

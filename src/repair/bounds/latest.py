@@ -39,17 +39,14 @@ class Proof:
         Since the reaction [s].
     attempt : Attempt
         With the tree, and the forbidden places to which it refers.
-    shapes : list of (K, 2) arrays
-        For each of these the convex obstacle (or piece of no road), seen from the start [m].
     obstacles : list of int
-        The ids of the obstacles; -1 for what is no road.
+        The ids of the obstacles of these places; -1 for what is no road.
     """
 
     time: float
     motions: Motions
     instants: Array
     attempt: Attempt
-    shapes: list[Array]
     obstacles: list[int]
 
 
@@ -155,11 +152,11 @@ class _World:
 def _bound(kind: str, world: _World, settings: BoundConfig) -> Bound:
     if kind == "search" and not world.checker.config.limits:
         return Bound(kind, math.inf, "limits_off")
-    begin = time.perf_counter()
+    begin = time.thread_time()
     nodes, found, why, cut = 0, None, "open", False
 
     def late() -> bool:
-        return time.perf_counter() - begin > settings.time_limit
+        return time.thread_time() - begin > settings.time_limit
 
     def proves(j: int) -> bool:
         nonlocal nodes, found, why, cut
@@ -181,7 +178,7 @@ def _bound(kind: str, world: _World, settings: BoundConfig) -> Bound:
         return True
 
     earliest(max((world.end - 1) // world.stride, -1), proves)
-    spent = time.perf_counter() - begin
+    spent = time.thread_time() - begin
     if found is None:
         return Bound(kind, math.inf, why, not cut, nodes, spent)
     return Bound(kind, found.time, "proven", not cut, nodes, spent, found)
@@ -220,7 +217,6 @@ def _proof(
     made = attempt(motions, times, shapes.vertices[samples], limit, late)
     if not made.proven:
         return made, None
-    used = [shapes.vertices[samples[c.instant], c.column] - motions.position for c in made.cuts]
     owners = [int(shapes.owner[c.column]) for c in made.cuts]
     ids = [world.scene.obstacles[o].id if o >= 0 else -1 for o in owners]
-    return made, Proof(k * world.h, motions, times, made, used, ids)
+    return made, Proof(k * world.h, motions, times, made, ids)

@@ -12,15 +12,35 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from repair.arrays import Array, wrap
 
-__all__ = ["Motions", "Turning"]
+__all__ = ["NEAR", "Motions", "Near", "Turning"]
 
 _FINE = 4  # pieces of a step over which the rate of turning is bounded
 _ANGLE = 1e-7  # by how much intervals of headings are widened against rounding [rad]
+_STANDS = 0.1  # below this speed [m/s] the checker knows no direction of the middle
+
+
+class Near(NamedTuple):
+    """How far a start may be off and a proof holds all the same: whoever integrates gets a little else.
+
+    Attributes
+    ----------
+    place, speed, heading, rate : float
+        [m], [m/s], [rad], [rad/s].
+    """
+
+    place: float = 5e-4
+    speed: float = 2e-3
+    heading: float = 5e-4
+    rate: float = 2e-3
+
+
+NEAR = Near()
 
 
 @dataclass(frozen=True)
@@ -96,6 +116,14 @@ class Motions:
         """Of the reference point at the start [m/s]."""
         return float(np.hypot(*self.velocity))
 
+    def slowest(self, t: float) -> float:
+        """Smallest speed until a time [s] after the start [m/s]."""
+        return max(self.speed - NEAR.speed - self.acceleration * t, 0.0)
+
+    def fastest(self, t: float) -> float:
+        """Largest speed until a time [s] after the start [m/s]."""
+        return self.speed + NEAR.speed + self.acceleration * t
+
     @cached_property
     def corners(self) -> Array:
         """Corners (4, 2) of the body, seen from the reference point, anticlockwise [m]."""
@@ -124,21 +152,29 @@ class Motions:
             angles = np.cumsum([(b - a) * self._rate(a, b, begin) for a, b in pieces])
             return np.concatenate(([0.0], angles[_FINE - 1 :: _FINE])) * (1.0 + 1e-9)
 
-        turned = turns(abs(self.yaw_rate))
+        spin = abs(self.yaw_rate) + NEAR.rate
+        turned = turns(spin)
         left, right = turned, turned
         if self.rear:
-            left, right = turns(max(self.yaw_rate, 0.0)), turns(max(-self.yaw_rate, 0.0))
+            left, right = (turns(max(sign * self.yaw_rate, 0.0) + NEAR.rate) for sign in (1.0, -1.0))
         slips = np.array([self._slip(a, b) for a, b in [(0.0, 0.0), *pieces]])
         slip = np.maximum.accumulate(slips)[::_FINE]
-        gone = self.acceleration * times
+        gone = self.acceleration * times + NEAR.speed
         veer = np.where(gone < self.speed, np.arcsin(np.minimum(gone / max(self.speed, 1e-9), 1.0)), np.inf)
+        if not self.rear:
+            veer = veer + NEAR.heading
         course = self.heading
         if self.rear:
             course += float(wrap(math.atan2(self.velocity[1], self.velocity[0]) - self.heading))
-        low = np.maximum(self.heading - right, np.minimum(self.heading, course - veer)) - _ANGLE
-        high = np.minimum(self.heading + left, np.maximum(self.heading, course + veer)) + _ANGLE
+        low = np.maximum(-right, np.minimum(0.0, course - veer - self.heading))
+        high = np.minimum(left, np.maximum(0.0, course + veer - self.heading))
+        low, high = (
+            self.heading + x + sign * (NEAR.heading + _ANGLE) for x, sign in ((low, -1.0), (high, 1.0))
+        )
         slow = np.maximum(self.speed - gone[1:], 1e-9)
         forward = np.minimum(np.minimum(self.forward, self.power / slow), self.acceleration)
+        if self.rear:
+            forward = np.where(slow > _STANDS, forward, self.acceleration)
         braking = np.full(len(forward), min(self.braking, self.acceleration))
         return Turning(low, high, turned, slip, course, veer + _ANGLE, forward, braking)
 
@@ -148,10 +184,10 @@ class Motions:
         ``begin`` is the rate to that side at the start, or 0. Of the rear axle: the largest of min(A / v,
         curvature v) over the speeds v that are possible. Of the middle: see :meth:`_across`.
         """
-        a, most = self.acceleration, self.curvature * (self.speed + self.acceleration * end)
+        a, most = self.acceleration, self.curvature * self.fastest(end)
         if self.rear:
             return min(most, self._across(start, end, begin) / self.rear)
-        slow = max(self.speed - a * end, 0.0)
+        slow = self.slowest(end)
         if slow >= math.sqrt(a / self.curvature):
             return a / slow
         return min(most, math.sqrt(a * self.curvature))
@@ -175,10 +211,10 @@ class Motions:
 
     def _axle(self, t: float) -> float:
         """Smallest speed of the rear axle [m/s] until a time after the start, of the middle's motions."""
-        slow = max(self.speed - self.acceleration * t, 0.0)
+        slow = self.slowest(t)
         axle = slow * math.cos(self._largest_slip)
         for _ in range(4):
-            across = self._swing(0.0, t, abs(self.yaw_rate), axle)
+            across = self._swing(0.0, t, abs(self.yaw_rate) + NEAR.rate, axle)
             axle = max(axle, math.sqrt(max(slow * slow - across * across, 0.0)))
         return axle
 
@@ -190,8 +226,8 @@ class Motions:
         """Bound on the slip angle [rad] between two times [s] after the start."""
         if not self.rear:
             return 0.0
-        slow = self.speed - self.acceleration * end
+        slow = self.slowest(end)
         if slow <= 0.0:
             return self._largest_slip
-        across = self._across(start, end, abs(self.yaw_rate))
+        across = self._across(start, end, abs(self.yaw_rate) + NEAR.rate)
         return min(self._largest_slip, math.asin(min(across / slow, 1.0))) + _ANGLE

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from repair.arrays import Array
+from repair.scene.traffic.shapes import off_centre
 from repair.world.tracks import BEFORE, CIRCLE, INSTANT, MOVING, POLYGON, Index, Track, tracks_of
 
 if TYPE_CHECKING:
@@ -40,11 +41,13 @@ def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Oc
 
     Rectangles, circles and rigid polygons move and turn linearly in time between the steps, sets hold on
     both sides of theirs: as :class:`repair.world.collision.CollisionWorld` has it. Polygons that do not
-    move as one body count at the steps alone.
+    move as one body count at the steps alone, and who is there in two readings counts in none.
     """
     columns: list[Array] = []
     owner: list[int] = []
     for index, obstacle in enumerate(obstacles):
+        if not _one_reading(obstacle):
+            continue
         held = obstacle.role == "set_based"
         tracks = [t for t in tracks_of(obstacle, n_samples, substeps) if t.mode != INSTANT]
         if not held and tracks[0].mode != MOVING:
@@ -61,6 +64,19 @@ def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Oc
         vertices[:, m, : part.shape[1]] = part
         vertices[:, m, part.shape[1] :] = part[:, -1:]
     return Occupied(vertices, np.array(owner, dtype=np.intp))
+
+
+def _one_reading(obstacle: Obstacle) -> bool:
+    """Whether there is one reading of where it is.
+
+    Bodies that are not centred on their position are in the scene twice, so that who keeps clear of both is
+    right either way; who meets one of both has met nothing for certain.
+    """
+    shapes = (
+        getattr(obstacle.source, "obstacle_shape", None),
+        getattr(getattr(obstacle.source, "prediction", None), "shape", None),
+    )
+    return not any(shape is not None and off_centre(shape) for shape in shapes)
 
 
 def _parts(track: Track, n_samples: int, every: int) -> list[Array]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
-from repair.bounds.motion import Motions
+from repair.bounds.motion import NEAR, Motions
 from repair.world.tracks import Index
 
 __all__ = ["Relaxation", "Rows", "excess"]
@@ -25,7 +25,7 @@ _PRICE = 1e6  # of a metre of slack, squared, against the effort of full acceler
 _SIDES = 12  # of the polygons around the discs
 _CELL = 0.05  # acceleration is constant over about this long [s]
 _SPEED = 0.3  # [s]: what a metre per second counts, in metres
-_SURE = 1e-6  # [m]
+_SURE = 2e-6  # [m]
 
 
 class Rows(NamedTuple):
@@ -160,7 +160,8 @@ def excess(motions: Motions, times: Array, rows: Rows, drive: Drive, multipliers
     swing = float(np.sum((end - begin) * (sizes[0] + 2.0 * sizes[1] + sizes[2]))) / 4.0
     free = np.where(moving, 1.0, at) * (weight @ motions.velocity)
     held = float(np.sum(free) - np.sum(np.where(moving, 0.0, multipliers / total * rows.level)))
-    return -(held + swing) - _SURE
+    start = np.where(moving, NEAR.speed, NEAR.place + NEAR.speed * at)  # by how much it may be off
+    return -(held + swing + float(multipliers @ start) / total) - _SURE
 
 
 def _support(w: Array, drive: Drive, most: float) -> Array:

@@ -35,5 +35,9 @@ class BoundConfig:
     )  # fmt: skip
     nodes: int = setting(200, "parts of a proof at most", low=1, high=100_000, only_with=_WITH)
     time_limit: float = setting(
-        2.0, "of each kind of bound [s]; what is proven by then stands", low=0.0, high=1e6, only_with=_WITH
+        2.0,
+        "processor time for each kind of bound [s]; what is proven by then stands",
+        low=0.0,
+        high=1e6,
+        only_with=_WITH,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +12,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array
 from repair.bounds.forbidden import forbidden
-from repair.bounds.motion import Motions
+from repair.bounds.motion import NEAR, Motions
 from repair.bounds.relaxed import Drive, Relaxation, Rows, excess
 
 __all__ = ["Attempt", "Forbidden", "attempt"]
@@ -21,6 +22,9 @@ _NARROW = 0.06  # intervals of headings shorter than this are not halved [rad]
 _ROUND = 0.01  # places are looked up for intervals of headings with ends on this grid [rad]
 _TRIED = 6  # contacts of a relaxed motion whose forbidden places are looked up
 _SLACK = 1e-5  # less than this is no sign of anything [m]
+_ANGLE = 1e-8  # outwards, against rounding [rad]
+_DIGITS = 7  # of multipliers, of which the largest is 1
+_PLACES = 6  # decimals of places [m]
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class Attempt:
         The proof (docs/bound.md has its form); None where there is none.
     cuts : list of Forbidden
         To which the tree refers by place.
+    shapes : list of (K, 2) arrays
+        The shape of each cut, seen from the start [m].
     open : (I, 2) array or None
         Places of a relaxed motion that meets nothing that is known, where that ended the attempt.
     """
@@ -69,6 +75,7 @@ class Attempt:
     nodes: int = 0
     tree: dict[str, Any] | None = None
     cuts: list[Forbidden] = field(default_factory=list)
+    shapes: list[Array] = field(default_factory=list)
     open: Array | None = None
 
 
@@ -93,7 +100,7 @@ class _Search:
         self.reach = 0.5 * motions.acceleration * times**2
         self.cuts: list[Forbidden] = []
         self._known: dict[tuple[int, int, float, float], int | None] = {}
-        shapes = shapes - motions.position
+        shapes = np.round(shapes - motions.position, _PLACES)
         middle = shapes.mean(axis=2)
         size = np.hypot(*np.moveaxis(shapes - middle[:, :, None], 3, 0)).max(axis=2)
         away = np.hypot(*np.moveaxis(middle - self.relaxed.free[:, None], 2, 0)) - size
@@ -127,7 +134,9 @@ class _Search:
             if children is None:
                 return Attempt(False, nodes, open=place + self.motions.position)
             stack += children
-        return Attempt(True, nodes, root, self.cuts)
+        column = {c: m for m, c in enumerate(self.columns.tolist())}
+        shapes = [self.shapes[c.instant, column[c.column]] for c in self.cuts]
+        return Attempt(True, nodes, root, self.cuts, shapes)
 
     # -- rows -------------------------------------------------------------------------------------------
 
@@ -172,14 +181,16 @@ class _Search:
         return Drive(np.stack((np.cos(middle), np.sin(middle)), axis=1), *bounds)
 
     def _closed(self, node: _Node, rows: Rows, drive: Drive, multipliers: Array) -> bool:
-        if not excess(self.motions, self.times, rows, drive, multipliers) > 0.0:
+        share = np.round(multipliers / multipliers.max(), _DIGITS)
+        if not excess(self.motions, self.times, rows, drive, share) > 0.0:
             return False
-        share = multipliers / multipliers.max()
         turned = (len(share) - len(node.places)) // 2
         names: list[tuple[Any, ...]] = [("place", *place) for place in node.places]
         instants = rows.instant[len(node.places) :].tolist()
-        names += [("course", i, 0 if k < turned else 1) for k, i in enumerate(instants)]
-        node.into["close"] = [[*name, float(m)] for name, m in zip(names, share, strict=True) if m > 1e-9]
+        slip = self.turning.slip
+        names += [("course", i, 0, float(node.low[i] - slip[i])) for i in instants[:turned]]
+        names += [("course", i, 1, float(node.high[i] + slip[i])) for i in instants[turned:]]
+        node.into["close"] = [[*name, float(m)] for name, m in zip(names, share, strict=True) if m > 0.0]
         return True
 
     # -- branching --------------------------------------------------------------------------------------
@@ -231,12 +242,16 @@ class _Search:
 
     def _cut(self, i: int, m: int, low: float, high: float) -> int | None:
         """Place in ``cuts`` of the polygon for a shape at an instant; None where there is none."""
-        low, high = np.floor(low / _ROUND) * _ROUND, np.ceil(high / _ROUND) * _ROUND
+        if high - low >= 2.0 * math.pi:
+            low, high = 0.0, 2.0 * math.pi + _ROUND
+        low = math.floor((low - _ANGLE) / _ROUND) * _ROUND
+        high = math.ceil((high + _ANGLE) / _ROUND) * _ROUND
         key = i, m, round(low, 6), round(high, 6)
         if key not in self._known:
             polygon = forbidden(self.shapes[i, m], self.motions.corners, key[2], key[3])
             self._known[key] = None
             if polygon is not None:
+                polygon = np.round(polygon, _PLACES)
                 way = np.roll(polygon, -1, axis=0) - polygon
                 normals = np.stack((way[:, 1], -way[:, 0]), axis=1) / np.hypot(*way.T)[:, None]
                 levels = np.sum(normals * polygon, axis=1)
@@ -249,7 +264,8 @@ class _Search:
         """One child for each side beyond which the reference point may be, each inside of those before."""
         c = self.cuts[cut]
         i = c.instant
-        far = c.normals @ self.relaxed.free[i] + self.reach[i] - c.levels < -1e-6
+        off = NEAR.place + NEAR.speed * self.times[i] + _SLACK  # as Relaxation and excess have it
+        far = c.normals @ self.relaxed.free[i] + self.reach[i] + off < c.levels
         # who cannot get beyond a side needs no row; the nearest side last, which is first on the stack
         order = np.argsort(c.normals @ place[i] - c.levels)
         sides = [*np.flatnonzero(far).tolist(), *(k for k in order.tolist() if not far[k])]
@@ -275,8 +291,8 @@ class _Search:
         turned = np.abs(self.turning.turned - self.turning.turned[i])
         children: list[_Node] = []
         for into, (a, b) in zip(parts, ((low, at), (at, high)), strict=True):
-            new_low = np.maximum(node.low, a - turned)
-            new_high = np.minimum(node.high, b + turned)
+            new_low = np.maximum(node.low, a - turned - _ANGLE)
+            new_high = np.minimum(node.high, b + turned + _ANGLE)
             narrowed = node.narrowed | (new_low > node.low + 1e-9) | (new_high < node.high - 1e-9)
             if (new_low > new_high).any():
                 into["empty"] = True

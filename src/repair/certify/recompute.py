@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Any
 from repair.certify.certificate import Certificate, CertificateRow
 from repair.certify.clearance import boxes_kept, clearance_rows
 from repair.certify.hull import derivative_rows, seam_rows
+from repair.certify.late.rows import late_rows
 from repair.certify.limits import driven_rows, physical_rows, weakened
-from repair.certify.motion import States, along_curve, through_states
+from repair.certify.motion import Motion, States, along_curve, through_states
 from repair.certify.plane import ContactTime, contact_rows, contact_time_row, road_rows, traffic_words
 from repair.certify.record import record_rows, searched_again
 from repair.certify.solution import (
@@ -56,13 +57,14 @@ def certify(folder: Path) -> Certificate:
     """
     folder = Path(folder)
     content = read_record(folder)
-    if content.get("solution_file") is None:
+    proven = bool((content.get("bound") or {}).get("proof_file"))
+    if content.get("solution_file") is None and not proven:
         raise RepairError(
             f"{folder} holds no trajectory to certify: "
             f"{content.get('status_sentence', content.get('status'))}"
         )
     try:
-        return _certified(folder, content)
+        return _certified(folder, content) if content.get("solution_file") else _proofs(folder, content)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise RepairError(
             f"{folder} cannot be certified, its result.json does not hold together: "
@@ -116,6 +118,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows += start_rows(states, problem, scene.vehicle, given=prepared.config.reference.source == "file")
     rows += agreement_rows(states, planned, scene.vehicle, dt, first)
     rows += _record_rows(content, prepared, curve, states, traffic)
+    rows += late_rows(folder, content, prepared, traffic, _reference(content, prepared))
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)
     rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap)
     rows.append(goal_row(part, problem))
@@ -129,6 +132,28 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
         *_under(prepared),
         traffic_words(traffic),
     )
+
+
+def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
+    """Of a result without a trajectory: what it says about when it is too late."""
+    from repair.scene.reading import read_file
+
+    path, prepared = _prepare(folder, content)
+    scene, anew = prepared.scene, read_file(path)
+    problem = anew.problems[scene.planning_problem_id]
+    traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
+    rows = late_rows(folder, content, prepared, traffic, _reference(content, prepared))
+    scenario, backend, status = (str(content.get(name)) for name in ("scenario", "backend", "status"))
+    words = traffic_words(traffic)
+    return Certificate(folder, scenario, backend, status, None, tuple(rows), *_under(prepared), words)
+
+
+def _reference(content: Mapping[str, Any], prepared: Prepared) -> Motion:
+    """The reference, driven anew from the orientation of the written trajectory on."""
+    scene = prepared.scene
+    until = steps_until(prepared.t_reference, scene.dt) * scene.dt
+    start = float(content["trajectory"]["orientation_rad"][0])
+    return along_curve(prepared.reference, scene.frame, scene.vehicle, until, scene.dt, start)
 
 
 # -- reading -----------------------------------------------------------------------------------------

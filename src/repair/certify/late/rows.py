@@ -1,0 +1,206 @@
+"""The rows of a certificate about the bound on the time to react."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repair.certify.certificate import CertificateRow, said
+from repair.certify.contact import outlines
+from repair.certify.late.assumed import OFF, Assumed, assumed
+from repair.certify.late.tree import Wrong, leaves
+from repair.certify.motion import Motion, wrapped
+from repair.certify.traffic import Body, Traffic
+from repair.errors import RepairError
+
+if TYPE_CHECKING:
+    from repair.preparation import Prepared
+
+__all__ = ["late_rows"]
+
+_ROUNDING = 1e-6  # [m] by which a shape may be outside of what it stands for: files hold micrometres
+_STEP = 0.025  # over which the reference's acceleration is looked at [s]
+_LARGEST = 50_000_000  # bytes of a proof: more is none
+
+
+def late_rows(
+    folder: Path, content: Mapping[str, Any], prepared: Prepared, traffic: Traffic, reference: Motion
+) -> list[CertificateRow]:
+    """Whether it is too late from the times on that the record says, by the proofs in the folder.
+
+    Parameters
+    ----------
+    folder : Path
+    content : mapping
+        What ``result.json`` holds.
+    prepared : Prepared
+        For vehicle, limits and reference.
+    traffic : Traffic
+        Read anew.
+    reference : Motion
+        The reference, driven anew.
+    """
+    told = content.get("bound")
+    if not told:
+        return []
+    claims = {k: float(one["t_bound_s"]) for k, one in told["kinds"].items() if one["t_bound_s"] is not None}
+    proofs = _read(folder / str(told["proof_file"]))["kinds"] if claims else {}
+    rows = []
+    for kind, time in claims.items():
+        name = f"too late from {time:g} s on ({kind})"
+        try:
+            count = _holds(kind, time, proofs[kind], prepared, traffic, reference)
+        except Wrong as wrong:
+            rows.append(said(name, False, "exact", str(wrong)))
+        except (KeyError, IndexError, TypeError, ValueError, OverflowError, ZeroDivisionError) as error:
+            rows.append(said(name, False, "exact", f"this is no proof: {type(error).__name__} {error}"))
+        else:
+            rows.append(said(name, True, "exact", f"{count} leaves"))
+    earliest, f_ttr = min(claims.values(), default=None), content.get("f_ttr_s")
+    kept = told["t_bound_s"] == earliest and (f_ttr is None or earliest is None or f_ttr < earliest)
+    upper = min(v for v in (earliest, content["ttc_s"], math.inf) if v is not None)
+    if f_ttr is not None and math.isfinite(upper):
+        grid = float(prepared.config.search.delta_t)
+        kept &= abs(told["gap_s"] - (upper - f_ttr)) < 1e-6
+        kept &= told["proven_optimal"] == (upper - f_ttr <= grid + 1e-9)
+    return [*rows, said("record: bound and gap", bool(kept), "files")]
+
+
+def _read(file: Path) -> Any:
+    try:
+        with gzip.open(file) as stream:
+            text = stream.read(_LARGEST)
+        return json.loads(text)
+    except (OSError, EOFError, ValueError, RecursionError) as error:
+        raise RepairError(f"the proof {file} cannot be read: {error}") from error
+
+
+def _holds(
+    kind: str, time: float, proof: Any, prepared: Prepared, traffic: Traffic, reference: Motion
+) -> int:
+    """Number of leaves of a proof that holds.
+
+    Raises
+    ------
+    Wrong
+        Otherwise.
+    """
+    if abs(float(proof["t_bound_s"]) - time) > 1e-6:
+        raise Wrong(f"the proof is of {float(proof['t_bound_s']):g} s")
+    if kind == "search" and not prepared.config.checker.limits:
+        raise Wrong("the limits are off, so nothing bounds what the checker accepts")
+    m = assumed(kind, prepared, proof["start"])
+    place = _start(kind, m, time, proof["start"], prepared, reference)
+    _followed(kind, m, time, prepared, reference)
+    if time + float(proof["instants_s"][-1]) > prepared.t_end + 1e-9:
+        raise Wrong("it looks at what is later than the repairs")
+    beside = _beside(prepared, traffic) if kind == "search" else frozenset()
+    for one in proof["places"]:
+        _occupied(one, time + float(proof["instants_s"][one["instant"]]), place, prepared, traffic, beside)
+    return leaves(m, proof)
+
+
+def _start(
+    kind: str, m: Assumed, time: float, told: Mapping[str, Any], prepared: Prepared, reference: Motion
+) -> tuple[float, float]:
+    """Where the proof starts, which has to be where the reference is."""
+    k = int(np.argmin(np.abs(reference.t - time)))
+    if abs(float(reference.t[k]) - time) > 1e-6:
+        raise Wrong("it starts when the reference does not")
+    rear = prepared.scene.vehicle.rear
+    (x, y, psi), theta, v = reference.poses[k], float(reference.heading[k]), float(reference.speed[k])
+    slip = float(wrapped(theta - psi))
+    rate = v * math.sin(slip) / rear
+    velocity = v * math.cos(theta), v * math.sin(theta)
+    if kind == "vehicle":
+        x, y = x - rear * math.cos(psi), y - rear * math.sin(psi)
+        velocity = v * math.cos(slip) * math.cos(psi), v * math.cos(slip) * math.sin(psi)
+    px, py = map(float, told["position_m"])
+    off = (
+        ("place", math.hypot(px - x, py - y)),
+        ("speed", math.hypot(m.vx - velocity[0], m.vy - velocity[1])),
+        ("heading", abs(float(wrapped(m.heading - psi)))),
+        ("rate", abs(m.rate - rate)),
+    )
+    for name, value in off:
+        if not value <= OFF[name]:
+            raise Wrong(f"it starts where the reference is not: {name} off by {value:.2g}")
+    return px, py
+
+
+def _followed(kind: str, m: Assumed, time: float, prepared: Prepared, reference: Motion) -> None:
+    """The reference has to be such a motion until the conflict: then later reactions are too late too."""
+    step = float(reference.t[1] - reference.t[0])
+    every = max(1, round(_STEP / step))
+    until = prepared.conflict.time
+    part = np.flatnonzero((reference.t >= time - 1e-9) & (reference.t <= until + 1e-9))[::every]
+    psi = reference.poses[part, 2]
+    speed = reference.speed[part] * np.exp(1j * reference.heading[part])
+    if kind == "vehicle":
+        speed = reference.speed[part] * np.cos(reference.heading[part] - psi) * np.exp(1j * psi)
+    if len(part) > 1 and float(np.abs(np.diff(speed)).max()) > 1.02 * m.disc * every * step + 1e-4:
+        raise Wrong("the reference goes beyond what is assumed, so that later times are another question")
+
+
+def _beside(prepared: Prepared, traffic: Traffic) -> frozenset[int]:
+    """Obstacles whose margin the ego starts in, which then does not count."""
+    import shapely
+
+    start, vehicle = prepared.scene.initial_state, prepared.scene.vehicle
+    wide = float(prepared.config.checker.clearance) + _ROUNDING
+    pose = np.array([[start.x, start.y, start.orientation]])
+    ego = outlines(pose, vehicle.half_length + wide, vehicle.half_width + wide)[0]
+    found = set()
+    for body in traffic.bodies:
+        there = _at(body, 0.0, prepared.scene.dt)
+        if there is not None and shapely.intersects(ego, there):
+            found.add(body.id)
+    return frozenset(found)
+
+
+def _occupied(
+    one: Mapping[str, Any], time: float, start: Sequence[float], prepared: Prepared, traffic: Traffic,
+    beside: frozenset[int],
+) -> None:  # fmt: skip
+    """A shape has to be inside of what the obstacle takes at its time."""
+    import shapely
+
+    obstacle = int(one["obstacle"])
+    if obstacle in beside:
+        raise Wrong(f"the margin of obstacle {obstacle}, in which the ego starts, does not count")
+    shape = shapely.Polygon([(float(x) + start[0], float(y) + start[1]) for x, y in one["shape"]])
+    for body in traffic.bodies:
+        if body.id == obstacle:
+            there = _at(body, time, prepared.scene.dt)
+            if there is not None and shapely.covers(there.buffer(_ROUNDING), shape):
+                return
+    raise Wrong(f"obstacle {obstacle} is not where it says at {time:.3f} s")
+
+
+def _at(body: Body, time: float, dt: float) -> Any:
+    """Outline of a body at a time; None where it is not there."""
+    from shapely import affinity
+
+    place = time / dt
+    k = math.floor(place + 1e-6)
+    share = min(max(place - k, 0.0), 1.0)
+    share = 0.0 if share < 1e-6 else share
+    if body.outline is None:
+        return body.held[k] if 0 <= k < len(body.held) else None
+    if not 0 <= k < len(body.poses) or (share and k + 1 >= len(body.poses)):
+        return None
+    pose = body.poses[k].copy()
+    if share:
+        change = body.poses[k + 1] - pose
+        change[2] = float(wrapped(change[2]))
+        pose += share * change
+    if not np.isfinite(pose).all():
+        return None
+    turned = affinity.rotate(body.outline, float(pose[2]), (0.0, 0.0), use_radians=True)
+    return affinity.translate(turned, float(pose[0]), float(pose[1]))
