@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from threading import Lock
 
@@ -18,11 +18,11 @@ from repair.errors import OutOfTime
 __all__ = ["Estimate", "OutOfTime", "held", "in_time", "limited", "time_left", "until"]
 
 _NEVER = float("inf")
+_NOTHING = nullcontext()
 _AT: ContextVar[float] = ContextVar("repair.deadline", default=_NEVER)
 
 
-@contextmanager
-def until(at: float | None) -> Iterator[None]:
+def until(at: float | None) -> AbstractContextManager[None]:
     """Set the deadline inside of a ``with`` block; one that is set already stays where it is earlier.
 
     Not to be held across the ``yield`` of a generator: it would hold for whoever asked that.
@@ -32,8 +32,12 @@ def until(at: float | None) -> Iterator[None]:
     at : float or None
         Of :func:`time.perf_counter` [s]; None sets nothing.
     """
-    before = _AT.get()
-    token = _AT.set(before if at is None else min(before, at))
+    return _NOTHING if at is None else _until(at)
+
+
+@contextmanager
+def _until(at: float) -> Iterator[None]:
+    token = _AT.set(min(_AT.get(), at))
     try:
         yield
     finally:
@@ -71,17 +75,20 @@ def in_time(needed: float = 0.0, what: str = "") -> None:
         raise OutOfTime(f"{what} takes about {needed:.2f} s, which are not left" if needed else what)
 
 
-@contextmanager
-def held(lock: Lock) -> Iterator[None]:
+def held(lock: Lock) -> AbstractContextManager[object]:
     """Hold a lock that another thread may hold for long.
 
     Raises
     ------
     OutOfTime
-        If it is not to be had before the deadline.
+        On entering, if it is not to be had before the deadline.
     """
-    left = time_left()
-    if not lock.acquire(timeout=-1 if left == _NEVER else left):
+    return _held(lock) if limited() else lock
+
+
+@contextmanager
+def _held(lock: Lock) -> Iterator[None]:
+    if not lock.acquire(timeout=time_left()):
         raise OutOfTime("another thread holds what is needed")
     try:
         yield

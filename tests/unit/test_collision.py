@@ -89,7 +89,7 @@ def test_polygons_as_in_shapely():
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * HALF @ np.array([[c, s], [-s, c]]) + (x, y)
         answers.append(shapely.Polygon(corners).intersects(shapely.Polygon(polygon)))
         for ring in (polygon[:-1], polygon[:-1][::-1]):
-            gap, _ = polygon_gap(ring @ [1.0, 1j] - complex(x, y), complex(c, s), complex(*HALF), 0.0)
+            gap, _ = polygon_gap((ring @ [1.0, 1j] - complex(x, y)) * complex(c, -s), complex(*HALF), 0.0)
             assert (gap <= 0.0) == answers[-1]
     assert 0.2 < np.mean(answers) < 0.8
 

@@ -87,9 +87,11 @@ def curve_excess(curve: Curve, t_from: float, t_end: float, limits: Limits, tole
     for cuts in (1, 16):  # the coarse hull mostly suffices
         times, low, high = _speeds(curve, t_from, t_end, cuts)
         found = []
-        if not float(low.min(initial=0.0)) >= -ROUNDING:
+        if not len(times):
+            break
+        if not smallest(low) >= -ROUNDING:
             found.append(Excess(float(times[np.argmin(low)]), f"reverses at {-float(low.min()):.2f} m/s"))
-        if not float(high.max(initial=0.0)) <= most + ROUNDING:
+        if not largest(high) <= most + ROUNDING:
             words = f"speed {float(high.max()):.2f} m/s of {most:.2f}"
             found.append(Excess(float(times[np.argmax(high > most + ROUNDING)]), words))
         if not found:
@@ -117,8 +119,8 @@ def _speeds(curve: Curve, t_from: float, t_end: float, cuts: int) -> tuple[Array
     hulled: Any = curve
     if _is_hulled(type(curve)):
         times, low, high = hulled.speed_hulls(cuts)
-        keep = times < t_end - ROUNDING
-        return times[keep], low[keep], high[keep]
+        count = int(times.searchsorted(t_end - ROUNDING))
+        return times[:count], low[:count], high[:count]
     times = np.linspace(t_from, t_end, max(2, round((t_end - t_from) / _FINE) + 1))
     speed = curve.sample(times).velocity[:, 0]
     return times, speed, speed

@@ -71,6 +71,14 @@ def sampling_at(
 
 
 @lru_cache(maxsize=64)
+def _segment_places(n: int, degree: int) -> npt.NDArray[np.intp]:
+    """Which control points (n - p, p + 1) each segment has."""
+    places = np.arange(n - degree)[:, None] + np.arange(degree + 1)
+    places.setflags(write=False)
+    return places
+
+
+@lru_cache(maxsize=64)
 def greville_offsets(n: int, degree: int, spacing: float) -> Array:
     """Time (n,) since the start of the span at which each control point acts [s]."""
     return frozen((np.arange(n) - (degree - 1) / 2) * spacing)
@@ -121,7 +129,7 @@ class UniformBSpline:
 
     def speed_hulls(self, cuts: int = 1) -> tuple[Array, Array, Array]:
         """Bounds of s' over parts of the curve (see :class:`repair.curves.base.Hulled`)."""
-        windows = np.lib.stride_tricks.sliding_window_view(self.points[:, 0], self.degree + 1)
+        windows = self.points[:, 0].take(_segment_places(len(self.points), self.degree))
         points = windows @ bernstein_matrix(self.degree).T
         return speed_hulls(points, self.t_start, self.spacing, cuts)
 

@@ -43,8 +43,8 @@ def speed_hulls(points: Array, t_start: float, duration: float, cuts: int) -> tu
         Start of the first piece and duration of each [s].
     """
     pieces, width = points.shape
-    speed = (width - 1) / duration * np.diff(points, axis=1)
+    speed = (width - 1) / duration * (points[:, 1:] - points[:, :-1])
     if cuts > 1:
         speed = np.einsum("cij,mj->mci", _cut(width - 2, cuts), speed).reshape(pieces * cuts, -1)
     times = t_start + duration / cuts * np.arange(pieces * cuts)
-    return times, speed.min(axis=1), speed.max(axis=1)
+    return times, np.minimum.reduce(speed, axis=1), np.maximum.reduce(speed, axis=1)

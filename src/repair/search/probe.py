@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -61,12 +61,10 @@ class Budget:
         """Nothing is left."""
         return self.left == 0.0
 
-    @contextmanager
-    def watched(self) -> Iterator[None]:
+    def watched(self) -> AbstractContextManager[None]:
         """The deadline of whatever is done inside of a ``with`` block."""
         left = self.left
-        with until(None if left is None else time.perf_counter() + left):
-            yield
+        return until(None if left is None else time.perf_counter() + left)
 
 
 def probe_sides(

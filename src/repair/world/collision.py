@@ -20,23 +20,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, Points, wrap
+from repair.arrays import Array, Points
 from repair.deadline import in_time
-from repair.world.advance import Motions, first_touch
-from repair.world.polygons import first_polygon_touch
+from repair.world.advance import first_touch
 from repair.world.table import TrackTable
 from repair.world.touching import CLOCKWISE, TOUCH, rectangles_touch
-from repair.world.tracks import AFTER, BEFORE, INSTANT, POLYGON, RECTANGLE, Index, as_complex
+from repair.world.tracks import POLYGON, RECTANGLE, Index, as_complex, ego_room
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
     from repair.vehicle.parameters import Vehicle
 
 __all__ = ["CollisionWorld", "Contact"]
-
-# A straight line between two samples a time h apart is off by an eighth of h**2 times the acceleration, and
-# that is at most twice what the second differences around the interval say.
-_BULGE = 2.0 / 8.0
 
 
 class Contact(NamedTuple):
@@ -204,9 +199,8 @@ class CollisionWorld:
             np.isfinite(here).all() and np.isfinite(orientation).all()
         ):
             raise ValueError("the ego's poses are not finite")
-        ways = np.abs(here[1:] - here[:-1])
         if step is None:
-            step = float(ways.max(initial=0.0))
+            step = float(np.abs(here[1:] - here[:-1]).max(initial=0.0))
         if asked.all_pairs:
             ego, row = self._table.everything(len(here), start)
         else:
@@ -216,9 +210,9 @@ class CollisionWorld:
             ego, row = ego[counted], row[counted]
         if not len(ego):
             return None
-        spare = _bulges(here, orientation, self._radius)
+        spare, reach = ego_room(here, orientation, self._radius)
         if not asked.all_pairs:
-            chosen = self._unsettled(here, orientation, ways, spare, ego, row, asked.margin)
+            chosen = self._unsettled(here, orientation, reach, ego, row, asked.margin)
             if not np.count_nonzero(chosen):
                 return None
             ego, row = ego[chosen], row[chosen]
@@ -231,8 +225,7 @@ class CollisionWorld:
             ego = np.arange(len(here))
             row = (ego + start) * len(self._table.kind) + m
             still = np.zeros(len(here), dtype=np.bool_)
-            none = np.zeros(len(here) - 1)
-            still[:] = self._unsettled(here, orientation, none, none, ego, row, asked.margin, still=True)
+            still[:] = self._unsettled(here, orientation, None, ego, row, asked.margin)
             left = np.flatnonzero(~still)
             since[m] = max(asked.since, int(left[0]) if len(left) else len(here))
         return since
@@ -242,9 +235,9 @@ class CollisionWorld:
         here, turn = np.array([centre]), np.array([orientation])
         tracks = np.arange(len(self._table.kind))
         row = sample * len(self._table.kind) + tracks
-        none, ego = np.zeros(0), np.zeros(len(tracks), dtype=np.intp)
+        none, ego = np.zeros(1), np.zeros(len(tracks), dtype=np.intp)
         wide = margin * (1 + 1j)
-        near = self._unsettled(here, turn, none, none, ego, row, wide, still=True)
+        near = self._unsettled(here, turn, None, ego, row, wide)
         asked = _Asked(wide, frozenset(), 0, True)
         return frozenset(
             self._table.owner[m]
@@ -254,27 +247,18 @@ class CollisionWorld:
         )
 
     def _unsettled(
-        self,
-        here: Points,
-        orientation: Array,
-        ways: Array,
-        spare: Array,
-        ego: Index,
-        row: Index,
-        margin: complex,
-        *,
-        still: bool = False,
+        self, here: Points, orientation: Array, reach: Array | None, ego: Index, row: Index, margin: complex
     ) -> npt.NDArray[np.bool_]:
         """Which pairs of a sample and a shape may meet until half way to the samples around.
 
-        With ``still`` those that do at the sample itself; of polygons, their circumcircles.
+        Parameters
+        ----------
+        reach : (K,) array or None
+            How far any point of the ego moves until the samples around [m]. None asks for those that meet at
+            the sample itself; of polygons, their circumcircles.
         """
         table, slack = self._table, np.zeros(len(row))
-        if not still:
-            ways = ways + self._radius * np.abs(wrap(np.diff(orientation))) + spare
-            reach = np.zeros(len(here))
-            reach[:-1] = ways
-            np.maximum(reach[1:], ways, out=reach[1:])
+        if reach is not None:
             slack = reach.take(ego) * table.share.take(row % len(table.kind)) + table.slack.take(row)
         axis = np.exp(orientation.take(ego) * CLOCKWISE)
         shapes = table.shapes.take(row, axis=1)
@@ -295,56 +279,15 @@ class CollisionWorld:
         asked: _Asked,
     ) -> _Hit | None:  # fmt: skip
         """First contact of pairs of samples and shapes, until the samples around, by advancement."""
-        count, last = len(self._table.kind), len(here) - 1
-        m = row % count
-        # Each pair as the two intervals beside it, and as the instant that it is.
-        first = np.concatenate((np.maximum(ego - 1, asked.since), ego, ego))
-        after = np.concatenate((ego, np.minimum(ego + 1, last), ego))
-        track = np.concatenate((m, m, m))
-        kept = (self._table.mode[track] != INSTANT) | (first == after)
-        known = np.unique((first * (last + 1) + after)[kept] * count + track[kept])
-        place, track = np.divmod(known, count)
-        first, after = np.divmod(place, last + 1)
-        mode = self._table.mode[track]
-        begin = np.where(mode == AFTER, after, first)
-        end = np.where(mode == BEFORE, first, after)
-        rows, rows_end = (begin + start) * count + track, (end + start) * count + track
-        there = np.isfinite(self._table.heading[rows]) & np.isfinite(self._table.heading[rows_end])
-        if not there.any():
-            return None
-        first, after, track, rows, rows_end = (x[there] for x in (first, after, track, rows, rows_end))
-        times = (np.arange(len(here)) + start) * (self.dt / self.substeps)
-        off = np.where(after > first, np.append(spare, 0.0)[first], 0.0)
-        pairs = Motions(
-            times[first], times[after], here[first], here[after], orientation[first],
-            orientation[first] + wrap(orientation[after] - orientation[first]),
-            self._table.shapes[0, rows], self._table.shapes[0, rows_end], self._table.heading[rows],
-            self._table.heading[rows] + wrap(self._table.heading[rows_end] - self._table.heading[rows]),
-            self._table.size[rows], self._table.size[rows_end], self._table.kind[track] != RECTANGLE, off,
-        )  # fmt: skip
-        polygon = self._table.kind[track] == POLYGON
-        found: list[_Hit] = []
-        plain = np.flatnonzero(~polygon)
-        half = self._half + asked.margin
-        touch = first_touch(pairs.take(plain), half)
-        if touch is not None:
-            i = plain[touch[1]]
-            found.append(_Hit(touch[0], int(first[i]), self._table.owner[track[i]]))
-        for i in np.flatnonzero(polygon).tolist():
+        half, unit, table = self._half + asked.margin, self.dt / self.substeps, self._table
+        best: _Hit | None = None
+        until = math.inf
+        for first, after, track in table.intervals(ego, row, asked.since, len(here) - 1):
+            if (first + start) * unit >= until:  # the others begin later
+                break
             in_time()
-            made = self._table.tracks[track[i]]
-            sample = start + int(after[i] if made.mode == AFTER else first[i])
-            time = first_polygon_touch(pairs, i, made.polygons[int(made.steps[sample])], half)
+            pair = table.motion(first, after, track, start, unit, here, orientation, spare)
+            time = None if pair is None else first_touch(pair[0], half, pair[1], until)
             if time is not None:
-                found.append(_Hit(time, int(first[i]), self._table.owner[track[i]]))
-        return min(found, default=None)
-
-
-def _bulges(here: Points, orientation: Array, radius: float) -> Array:
-    """By how much the ego may be off the straight way between its samples (K - 1,) [m], turning included."""
-    bend = np.zeros(len(here))
-    if len(here) > 2:
-        bend[1:-1] = np.abs(here[2:] - 2.0 * here[1:-1] + here[:-2])
-        bend[1:-1] += radius * np.abs(np.diff(wrap(np.diff(orientation))))
-        bend[0], bend[-1] = bend[1], bend[-2]
-    return np.asarray(_BULGE * np.maximum(bend[1:], bend[:-1]))
+                until, best = time, _Hit(time, first, table.owner[track])
+        return best

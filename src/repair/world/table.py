@@ -5,14 +5,22 @@ Each sample stands for the time half way to its neighbours. Columns are tracks: 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repair.arrays import Array, Points, wrap
+from repair.world.advance import Left, Motion, circle_left, rectangle_left
+from repair.world.polygons import polygons_left
 from repair.world.tracks import (
+    AFTER,
+    BEFORE,
+    CIRCLE,
+    INSTANT,
     MOVING,
+    POLYGON,
     RECTANGLE,
     Index,
     Track,
@@ -130,3 +138,55 @@ class TrackTable:
         """As :meth:`near`, nothing left out."""
         ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
         return ego, (ego + start) * len(self.kind) + track
+
+    def intervals(self, ego: Index, row: Index, since: int, last: int) -> list[tuple[int, int, int]]:
+        """Pairs of a sample and a shape as the two intervals beside it, and as the instant that it is.
+
+        Parameters
+        ----------
+        ego, row : (n,) array
+        since, last : int
+            The first of the ego's samples that counts, and the last one.
+
+        Returns
+        -------
+        list of (first, after, track)
+            The interval's samples, the same one twice for an instant; each once, in the order of time.
+        """
+        found: set[tuple[int, int, int]] = set()
+        for k, m in zip(ego.tolist(), (row % len(self.kind)).tolist(), strict=True):
+            found.add((k, k, m))
+            if self.mode[m] != INSTANT:
+                found.add((max(k - 1, since), k, m))
+                found.add((k, min(k + 1, last), m))
+        return sorted(found)
+
+    def motion(
+        self, first: int, after: int, track: int, start: int, unit: float, here: Points, orientation: Array,
+        spare: Array,
+    ) -> tuple[Motion, Left] | None:  # fmt: skip
+        """How the ego and a shape move in one of :meth:`intervals`; None where the shape is not there."""
+        mode, kind, count = self.tracks[track].mode, self.tracks[track].kind, len(self.tracks)
+        row = ((after if mode == AFTER else first) + start) * count + track
+        row_end = ((first if mode == BEFORE else after) + start) * count + track
+        heading, heading_end = self.heading.item(row), self.heading.item(row_end)
+        if math.isnan(heading + heading_end):
+            return None
+        left: Left = rectangle_left
+        size = self.size.item(row)
+        reach = max(abs(size), abs(self.size.item(row_end)))
+        if kind == CIRCLE:
+            left, reach = circle_left, 0.0
+        elif kind == POLYGON:
+            made = self.tracks[track]
+            left, reach = polygons_left(made.polygons[made.steps.item(row // count)])
+        place = self.shapes.item(0, row) - here.item(first)
+        begin, angle = (first + start) * unit, orientation.item(first)
+        return Motion(
+            begin, (after + start) * unit - begin,
+            place, self.shapes.item(0, row_end) - here.item(after) - place,
+            size, self.size.item(row_end) - size,
+            angle, wrap(orientation.item(after) - angle).item(),
+            heading, wrap(heading_end - heading).item(),
+            reach, spare.item(first) if after > first else 0.0,
+        ), left  # fmt: skip

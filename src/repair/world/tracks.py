@@ -1,4 +1,4 @@
-"""Obstacles as tracks of shapes over the samples, and the ego's samples in blocks."""
+"""Obstacles as tracks of shapes over the samples; the ego's samples in blocks, and what lies between them."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ __all__ = [
     "Track",
     "as_complex",
     "block_samples",
+    "ego_room",
     "shape_rows",
     "tracks_of",
 ]
@@ -36,6 +37,9 @@ RECTANGLE, CIRCLE, POLYGON = range(3)
 #: Between the steps a track moves, or is held from the step before or after, or is there at the steps alone.
 MOVING, BEFORE, AFTER, INSTANT = range(4)
 _RIGID = 1e-3  # polygons whose corners keep their places this well [m] move as one body
+# A straight line between two samples a time h apart is off by an eighth of h**2 times the acceleration, and
+# that is at most twice what the second differences around the interval say.
+_BULGE = 2.0 / 8.0
 
 _Parts = tuple[Array, ...]
 
@@ -191,6 +195,32 @@ def block_samples(start: int, stop: int, size: int, tracks: int) -> tuple[Index,
     for indices in made:
         indices.setflags(write=False)
     return made
+
+
+def ego_room(here: Points, orientation: Array, radius: float) -> tuple[Array, Array]:
+    """What the ego's motion between its samples may add.
+
+    Returns
+    -------
+    spare : (K,) array
+        By how much it may be off the straight way to the next sample [m], turning included; the last is 0.
+    reach : (K,) array
+        How far any of its points moves until the sample before or after [m].
+    """
+    count = len(here)
+    spare, reach = np.zeros((2, count))
+    if count > 1:
+        steps, turns = here[1:] - here[:-1], wrap(orientation[1:] - orientation[:-1])
+        ways = np.abs(steps) + radius * np.abs(turns)
+        if count > 2:
+            bend = np.abs(steps[1:] - steps[:-1]) + radius * np.abs(turns[1:] - turns[:-1])
+            bend *= _BULGE
+            spare[0], spare[1:-1] = bend[0], bend
+            np.maximum(spare[1:-2], bend[1:], out=spare[1:-2])
+            ways += spare[:-1]
+        reach[:-1] = ways
+        np.maximum(reach[1:], ways, out=reach[1:])
+    return spare, reach
 
 
 def as_complex(x: Array, y: Array) -> Points:
