@@ -153,6 +153,8 @@ class _Source:
     def relaxed(self, t_rep):
         return ()
 
+    notches = ((), (), ())
+
     def widened(self, t_rep):
         return ()
 
@@ -257,6 +259,8 @@ def test_the_checker_may_accept_the_closest_curve_unless_the_problem_is_strict(s
     problem = replace(problems.too_near(), strict=strict)
 
     class Source:
+        notches = ((), (), ())
+
         def at(self, t_rep):
             return (problem,)
 

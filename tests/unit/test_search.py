@@ -29,6 +29,7 @@ class FakeSource:
     maneuvers: tuple[Maneuver | None, ...] = (Maneuver.YIELD,)
     asked: list[float] = field(default_factory=list)
     open_until: float = float("inf")  # later guides only come closest
+    notches: tuple[tuple[float, ...], ...] = ((), (), ())
 
     def at(self, t_rep):
         self.asked.append(t_rep)

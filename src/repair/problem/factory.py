@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -77,13 +77,22 @@ class ProblemFactory:
                 yield problems
 
     def widened(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
-        """The problems again with larger and larger margins, as ``repair.widen`` lists them."""
-        for more in self.settings.widen:
-            problems = self.at(t_rep, self.settings.margin + more, more)
-            if problems:
-                yield problems
+        """The problems again with larger and larger margins, as ``repair.widen`` lists them.
 
-    def at(self, t_rep: float, margin: float | None = None, room: float = 0.0) -> tuple[RepairProblem, ...]:
+        Their guides keep the larger margins, so that other ways may be the ones to take.
+        """
+        for more in self.settings.widen:
+            yield tuple(
+                replace(problem, clearance=problem.clearance + more)
+                for problem in self.at(t_rep, self.settings.margin + more)
+            )
+
+    @property
+    def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """By what a problem is tightened: ``repair.widen``, ``narrow`` and ``ease``."""
+        return self.settings.widen, self.settings.narrow, self.settings.ease
+
+    def at(self, t_rep: float, margin: float | None = None) -> tuple[RepairProblem, ...]:
         """One problem for each open side of passing, the gentlest guide first.
 
         Parameters
@@ -91,8 +100,6 @@ class ProblemFactory:
         margin : float, optional
             Distance to the inflated boxes [m]; negative values allow into them. By default
             ``repair.margin``.
-        room : float
-            What soft backends keep beyond ``repair.clearance`` [m].
         """
         settings = self.settings
         margin = settings.margin if margin is None else margin
@@ -111,7 +118,7 @@ class ProblemFactory:
         # on any path that it can drive at all.
         return tuple(
             self._problem(
-                t_rep, start, occupancy, margin, room, passing,
+                t_rep, start, occupancy, margin, passing,
                 lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings
@@ -137,12 +144,11 @@ class ProblemFactory:
         columns = (guide.t, guide.position, guide.velocity, guide.acceleration, guide.jerk)
         path = FrenetTrajectory(*(frozen(column) for column in columns))
         passing = Passing(kind, path, sides_of(guide.position, lower, upper), 0.0)
-        return self._problem(t_rep, start, occupancy, settings.margin, 0.0, passing, lateral)
+        return self._problem(t_rep, start, occupancy, settings.margin, passing, lateral)
 
     def _problem(
-        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, room: float, passing: Passing,
-        lateral: bool,
-    ) -> RepairProblem:  # fmt: skip
+        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing, lateral: bool
+    ) -> RepairProblem:
         s, curvature = self._axis
         return RepairProblem(
             reference=self.reference,
@@ -152,7 +158,7 @@ class ProblemFactory:
             occupancy=occupancy,
             bounds=self.bounds,
             limits=self.limits,
-            clearance=self.settings.clearance + room,
+            clearance=self.settings.clearance,
             margin=margin,
             passing=passing,
             curvature_s=s,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -138,6 +138,26 @@ class RepairProblem:
     half_length: float
     lateral: bool = True
     strict: bool = False
+
+    def tightened(self, room: float, edge: float, unused: float) -> RepairProblem:
+        """The same way past the obstacles, to be kept with more to spare.
+
+        Parameters
+        ----------
+        room : float
+            Added to margin and clearance [m].
+        edge : float
+            By which the road is narrowed on both sides [m].
+        unused : float
+            Share of every acceleration limit that is left unused.
+        """
+        return replace(
+            self,
+            margin=self.margin + room,
+            clearance=self.clearance + room,
+            bounds=self.bounds.narrowed(edge) if edge and self.lateral else self.bounds,
+            limits=self.limits.reserving(unused) if unused else self.limits,
+        )
 
     def curvature_at(self, s: npt.ArrayLike) -> Array:
         """Curvature of the frame's axis [1/m] at ``s``."""

@@ -63,6 +63,16 @@ class RepairConfig:
         # A box in (s, l) is narrower than the vehicle in a bend or at an angle to the path.
         says="what is added to margin and clearance [m], one after the other, where a curve came too close",
     )
+    narrow: list[float] = setting(
+        factory=lambda: [0.1, 0.3, 0.6],
+        # The corners of a vehicle at an angle to the road are nearer to its edge than half the width.
+        says="by what the road is narrowed [m], one after the other, where a curve left it",
+    )
+    ease: list[float] = setting(
+        factory=lambda: [0.05, 0.1, 0.2],
+        # Soft limits are exceeded a little where they matter most.
+        says="share of the acceleration limits left unused, one after the other, where a curve exceeded them",
+    )
     lateral: str = setting(
         "road",
         "how far a repair may leave its path sideways",

@@ -15,7 +15,19 @@ from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
 from repair.search.result import Probe
 
-__all__ = ["Budget", "ProblemSource", "TrajectoryChecker", "probe_sides"]
+__all__ = [
+    "Budget",
+    "ProblemSource",
+    "Rejected",
+    "TrajectoryChecker",
+    "better",
+    "probe_one",
+    "probe_sides",
+    "words",
+]
+
+#: The sides that the checker rejected, and what it said of each.
+Rejected = list[tuple[RepairProblem, Verdict]]
 
 
 class ProblemSource(Protocol):
@@ -31,6 +43,11 @@ class ProblemSource(Protocol):
 
     def widened(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
         """The problems again with larger and larger margins, for curves that came too close."""
+        ...
+
+    @property
+    def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """By what a rejected problem is tightened, step by step: room [m], road [m], limits (shares)."""
         ...
 
 
@@ -75,40 +92,67 @@ def probe_sides(
     sides: str,
     warm_start: Curve | None,
     budget: Budget,
-) -> Probe:
-    """Solve and check every open side; keep the feasible one of least cost, else the first failure."""
+) -> tuple[Probe, Rejected]:
+    """Solve and check every open side; keep the feasible one of least cost, else the first failure.
+
+    Returns
+    -------
+    probe : Probe
+    rejected : list of (RepairProblem, Verdict)
+        The sides that failed.
+    """
     best: Probe | None = None
     tried: list[str] = []
+    rejected: Rejected = []
     for problem in problems:
         if tried and budget.spent:
             budget.cut = True
             break
-        try:
-            solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
-        except OutOfTime as late:  # of something in it that looks at the deadline
-            solve = SolveResult(SolveStatus.TIME_LIMIT, detail=str(late))
-        budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
-        begin = budget.clock()
-        try:
-            solve, verdict, margin = _judged(problem, solve, checker, t_rep)
-        except OutOfTime:  # a curve that nobody has judged is none
-            budget.cut, margin = True, problem.margin
-            detail = "a curve was found, and no time was left to judge it"
-            solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
-            verdict = _unsolved(solve, t_rep)
-        maneuver = problem.passing.maneuver if problem.passing is not None else None
-        name = maneuver.value if maneuver is not None else "follow"
-        tried.append(f"{name}: {'feasible' if verdict.ok else ', '.join(verdict.reasons)}")
-        probe = Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
-        if best is None or _better(probe, best):
+        probe = probe_one(t_rep, problem, backend, checker, warm_start, budget)
+        tried.append(words(probe))
+        if not probe.feasible:
+            rejected.append((problem, probe.verdict))
+        if best is None or better(probe, best):
             best = probe
         if sides == "first" and probe.feasible:
             break
     if best is None:
         nothing = SolveResult(SolveStatus.INFEASIBLE, detail="no manoeuvre past the obstacles is open")
         why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
-        return Probe(t_rep, nothing, Verdict((why,)))
-    return Probe(t_rep, best.solve, best.verdict, best.maneuver, best.check_time, tuple(tried), best.margin)
+        return Probe(t_rep, nothing, Verdict((why,))), rejected
+    return replace(best, tried=tuple(tried)), rejected
+
+
+def probe_one(
+    t_rep: float,
+    problem: RepairProblem,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    warm_start: Curve | None,
+    budget: Budget,
+) -> Probe:
+    """Solve one side and check it."""
+    try:
+        solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
+    except OutOfTime as late:  # of something in it that looks at the deadline
+        solve = SolveResult(SolveStatus.TIME_LIMIT, detail=str(late))
+    budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
+    begin = budget.clock()
+    try:
+        solve, verdict, margin = _judged(problem, solve, checker, t_rep)
+    except OutOfTime:  # a curve that nobody has judged is none
+        budget.cut, margin = True, problem.margin
+        detail = "a curve was found, and no time was left to judge it"
+        solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
+        verdict = _unsolved(solve, t_rep)
+    maneuver = problem.passing.maneuver if problem.passing is not None else None
+    return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
+
+
+def words(probe: Probe) -> str:
+    """The side that was tried, and what came of it."""
+    name = probe.maneuver.value if probe.maneuver is not None else "follow"
+    return f"{name}: {'feasible' if probe.verdict.ok else ', '.join(probe.verdict.reasons)}"
 
 
 def _judged(
@@ -129,7 +173,8 @@ def _judged(
     return solve, verdict, margin
 
 
-def _better(new: Probe, old: Probe) -> bool:
+def better(new: Probe, old: Probe) -> bool:
+    """Feasible where the old one is not, or both, and of less cost."""
     if new.feasible != old.feasible:
         return new.feasible
     return new.feasible and new.solve.objective < old.solve.objective

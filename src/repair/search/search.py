@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from repair.backend.base import RepairBackend
-from repair.check.verdict import Conflict, Reason
+from repair.check.verdict import Conflict
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime
 from repair.problem.problem import RepairProblem
-from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_sides
+from repair.search.again import other_ways, probe_again, too_close
+from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import Order, probe_order
 from repair.search.settings import SearchConfig
@@ -90,33 +91,33 @@ def _visit(
 ) -> Probe:
     """One t_rep, with its first problems and then with other margins."""
     budget.cut = False
-    probe = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
-    others = []
-    # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow: a curve that keeps out of
-    # the boxes is rejected by the checker, which looks at the true rectangles. Beside one that turns they
-    # are too wide: a hard backend would call a repair infeasible that the checker accepts.
-    if _too_close(probe):
-        others.append(source.widened)
+    probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
+    if not probe.feasible:
+        probe = probe_again(
+            probe, rejected, source,
+            lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
+        )  # fmt: skip
+    # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow, and past larger ones
+    # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
+    # a repair infeasible that the checker accepts.
+    others: list[Iterable[Sequence[RepairProblem]]] = []
+    if too_close(rejected):
+        others.append(other_ways(first, source.widened(t_rep)))
     if backend.capabilities.relaxes:
-        others.append(source.relaxed)
+        others.append(source.relaxed(t_rep))
     try:
-        for problems in itertools.chain.from_iterable(again(t_rep) for again in others):
+        for problems in itertools.chain.from_iterable(others):
             if probe.feasible:
                 break
             if budget.spent:
                 budget.cut = True
                 break
-            again = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
+            again, _ = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
             tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
             probe = replace(again if again.feasible else probe, tried=tried)
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
-
-
-def _too_close(probe: Probe) -> bool:
-    near = (Reason.COLLISION, Reason.MARGIN)
-    return any(violation.reason in near for violation in probe.verdict.violations)
 
 
 def _given(visits: Sequence[float]) -> Order:

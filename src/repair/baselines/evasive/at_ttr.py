@@ -7,7 +7,7 @@ guarantees a repair at the TTR is the paper's argument for searching both togeth
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from repair.baselines.evasive.maneuvers import EvasiveManeuver
@@ -65,3 +65,8 @@ class AtTtr:
     def widened(self, t_rep: float) -> Iterable[tuple[RepairProblem, ...]]:
         """As the search has it: see :meth:`repair.search.probe.ProblemSource.widened`."""
         return self.factory.widened(t_rep)
+
+    @property
+    def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """As the search has them: see :attr:`repair.search.probe.ProblemSource.notches`."""
+        return self.factory.notches

@@ -43,6 +43,11 @@ class LateralBounds:
         query = np.asarray(s, dtype=np.float64)
         return np.interp(query, self.s, self.right), np.interp(query, self.s, self.left)
 
+    def narrowed(self, by: float) -> LateralBounds:
+        """The same with ``by`` [m] less on both sides; the path (l = 0) stays allowed."""
+        right, left = np.minimum(self.right + by, 0.0), np.maximum(self.left - by, 0.0)
+        return LateralBounds(self.s, frozen(right), frozen(left))
+
 
 @dataclass(frozen=True)
 class LaneletCrossings:

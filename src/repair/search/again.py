@@ -1,0 +1,114 @@
+"""A way past the obstacles that the checker rejected, asked for again with more to spare where it failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from repair.check.verdict import Reason, Verdict
+from repair.problem.problem import RepairProblem
+from repair.search.probe import Budget, ProblemSource, Rejected, better, words
+from repair.search.result import Probe
+
+__all__ = ["Notches", "other_ways", "probe_again", "too_close"]
+
+#: What is tightened, and the reasons it answers.
+_ANSWERS = (
+    (Reason.COLLISION, Reason.MARGIN),
+    (Reason.OFF_ROAD,),
+    (Reason.LIMITS, Reason.KINEMATICS),
+)
+
+
+class Notches(NamedTuple):
+    """How many notches room, road and limits are tightened by."""
+
+    room: int = 0
+    edge: int = 0
+    ease: int = 0
+
+    def after(self, verdict: Verdict) -> Notches:
+        """One notch more of whatever the verdict misses."""
+        missed = {violation.reason for violation in verdict.violations}
+        return Notches(*(k + any(r in missed for r in why) for k, why in zip(self, _ANSWERS, strict=True)))
+
+    def amounts(self, lists: Sequence[Sequence[float]]) -> tuple[float, ...] | None:
+        """Metres of room and of road, and the share of the limits; None where a list has no such notch."""
+        if any(k > len(notches) for k, notches in zip(self, lists, strict=True)):
+            return None
+        return tuple(notches[k - 1] if k else 0.0 for k, notches in zip(self, lists, strict=True))
+
+
+def probe_again(
+    probe: Probe,
+    rejected: Rejected,
+    source: ProblemSource,
+    ask: Callable[[RepairProblem], Probe],
+    sides: str,
+    budget: Budget,
+) -> Probe:
+    """Tighten each side by what the checker missed, again and again, until it passes or nothing is left.
+
+    Backends see boxes and single points of the curve, soft ones may exceed each of them a little; the checker
+    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room.
+
+    Parameters
+    ----------
+    probe : Probe
+        Of the sides as they were; the answer where none of them can be had.
+    rejected : sequence of (RepairProblem, Verdict)
+        The sides, and what the checker said of each.
+    source : ProblemSource
+        Says by how much.
+    ask : callable
+        Solves and checks a problem.
+    sides : str
+        ``search.sides``.
+    budget : Budget
+    """
+    best, tried = probe, list(probe.tried)
+    for problem, first in rejected:
+        verdict, taken = first, Notches()
+        while not verdict.ok:
+            further = taken.after(verdict)
+            amounts = further.amounts(source.notches)
+            if further == taken or amounts is None:
+                break
+            if budget.spent:
+                budget.cut = True
+                return replace(best, tried=tuple(tried))
+            again = ask(problem.tightened(*amounts))
+            tried.append(f"{words(again)} ({_said(*amounts)})")
+            verdict, taken = again.verdict, further
+            if again.feasible and better(again, best):
+                best = again
+        if best.feasible and sides == "first":
+            break
+    return replace(best, tried=tuple(tried))
+
+
+def too_close(rejected: Rejected) -> bool:
+    """Some side came too close to an obstacle."""
+    return any(Notches().after(verdict).room for _, verdict in rejected)
+
+
+def other_ways(
+    asked: Sequence[RepairProblem], wider: Iterable[Sequence[RepairProblem]]
+) -> Iterator[Sequence[RepairProblem]]:
+    """Of the problems with larger margins those whose manoeuvre has not been asked for."""
+    known = {problem.passing and problem.passing.maneuver for problem in asked}
+    for problems in wider:
+        fresh = [p for p in problems if (p.passing and p.passing.maneuver) not in known]
+        known |= {problem.passing and problem.passing.maneuver for problem in fresh}
+        if fresh:
+            yield fresh
+
+
+def _said(room: float, edge: float, unused: float) -> str:
+    parts = (
+        f"margin +{room:g} m" if room else "",
+        f"road {edge:g} m narrower" if edge else "",
+        f"{100.0 * unused:g} % of the limits unused" if unused else "",
+    )
+    return ", ".join(part for part in parts if part)
