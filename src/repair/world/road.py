@@ -220,14 +220,14 @@ def _outlines(network: Any) -> list[Any]:
     """
     import shapely
 
-    found = []
+    lanelets, found = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}, []
     for members, outline in _sections(network):
         section = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
         found.append(section if section.is_valid else section.buffer(0))
         if not section.is_valid:
-            lanes = [network.find_lanelet_by_id(member) for member in members]
+            lanes = [lanelets[member] for member in members]
             rings = [np.concatenate([x.left_vertices, x.right_vertices[::-1]])[:, :2] for x in lanes]
-            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
+            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 2]
     return found
 
 
