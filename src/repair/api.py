@@ -16,7 +16,7 @@ from repair.bounds.latest import Bound, bound
 from repair.check.peaks import Peaks
 from repair.config.load import load_config
 from repair.config.schema import Config, require_types
-from repair.curves.base import Curve, SplicedCurve
+from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
 from repair.errors import BackendError, ConfigError, OutputError, RepairError, foreign, kind_of, path_of
 from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
@@ -25,7 +25,7 @@ from repair.metrics.base import Asked, MetricValue
 from repair.metrics.registry import measure
 from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
-from repair.outcome.record import driven_curve
+from repair.outcome.driven import driven_curve, what_is_driven
 from repair.preparation import Phases, Prepared, among, prepare
 from repair.report.notebook import page_of
 from repair.report.text import headline
@@ -36,6 +36,7 @@ from repair.search.modes import ModeResult, each_mode
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
 from repair.solvers.registry import make_backend
+from repair.terminal.verdict import Terminal
 from repair.vehicle.commonroad_ks import load_official
 from repair.vehicle.states import DrivenStates
 
@@ -69,6 +70,9 @@ class RepairResult:
         Of the backend.
     bounds : dict
         From when on it is proven too late, by kind; empty where it was not asked for (``bound.wanted``).
+    terminal : Terminal or None
+        How the repair ends: the stop that follows it, and how safe that is; None without a repair, and with
+        ``checker.terminal: off``.
     """
 
     prepared: Prepared
@@ -80,6 +84,7 @@ class RepairResult:
     capabilities: Capabilities = field(default_factory=Capabilities)
     modes: tuple[ModeResult, ...] = ()
     bounds: dict[str, Bound] = field(default_factory=dict)
+    terminal: Terminal | None = None
 
     def __repr__(self) -> str:
         return "\n".join(f"{name:9} {text}" for name, text in headline(self.to_dict()))
@@ -123,7 +128,7 @@ class RepairResult:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
             self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
-            self.modes, self.bounds,
+            self.modes, self.bounds, self.terminal,
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
@@ -262,12 +267,7 @@ def search(
     if wanted:
         with timed("metrics"):
             metrics = measure(wanted, asked)
-    curve, t_end, reached = prepared.reference, prepared.t_reference, None
-    if found.curve is not None:
-        t_rep = float(found.f_ttr or 0.0)
-        curve, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
-        reached = prepared.checker.peaks(curve, t_end, t_rep)
-    states = prepared.checker.drive(curve, t_end).every(config.checker.substeps)
+    driven = what_is_driven(prepared, found, timed)
     modes: tuple[ModeResult, ...] = ()
     if prepared.scene.modes:
         with timed("modes"):
@@ -280,8 +280,9 @@ def search(
         with timed("bound"):
             bounds = bound(prepared, config.bound)
     return RepairResult(
-        prepared, found, states, reached, timed.seconds, metrics, backend.capabilities, modes, bounds
-    )
+        prepared, found, driven.states, driven.peaks, timed.seconds, metrics, backend.capabilities, modes,
+        bounds, driven.terminal,
+    )  # fmt: skip
 
 
 def find(
@@ -314,7 +315,7 @@ def find(
     backend = Guarded(backend, prepared.config.backend)
     if prepared.config.driver != "at_ttr":
         return search_f_ttr(
-            prepared.source, prepared.conflict, backend, prepared.checker, settings,
+            prepared.source, prepared.conflict, backend, prepared.judge, settings,
             visits=visits, on_probe=on_probe,
         )  # fmt: skip
     begin = time.perf_counter()
@@ -330,6 +331,6 @@ def find(
     if limit is not None:  # finding the TTR is part of it
         settings = replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 0.0))
     return search_f_ttr(
-        source, prepared.conflict, backend, prepared.checker, settings,
+        source, prepared.conflict, backend, prepared.judge, settings,
         visits=source.visits, on_probe=on_probe,
     )  # fmt: skip

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 from repair.arrays import in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
-from repair.curves.base import Curve
+from repair.curves.base import Curve, SplicedCurve
 from repair.problem.factory import ProblemFactory
 from repair.problem.limits import Limits
 from repair.problem.settings import RepairConfig
+from repair.terminal.judge import EndJudge
+from repair.terminal.required import SafeEnds
+from repair.terminal.verdict import Terminal
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
@@ -66,3 +69,21 @@ class Situation:
         """The repair problems of any t_rep."""
         limits = self.limits.reserving(self.settings.reserve)
         return ProblemFactory(self.scene, self.settings, limits, self.occupancy, self.reference, self.t_end)
+
+    @cached_property
+    def ends(self) -> EndJudge:
+        """Who judges how a repair ends."""
+        return EndJudge(self.checker, self.source)
+
+    @property
+    def judge(self) -> Checker | SafeEnds:
+        """Who judges a repair: the checker, with ``checker.terminal: require`` its end as well."""
+        if self.checker.config.terminal == "require":
+            return SafeEnds(self.checker, self.ends)
+        return self.checker
+
+    def ending(self, repaired: Curve, t_rep: float) -> Terminal | None:
+        """How a repair ends; None with ``checker.terminal: off``."""
+        if self.checker.config.terminal == "off":
+            return None
+        return self.ends(SplicedCurve(self.reference, repaired, t_rep), self.t_end)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from repair.certify.certificate import CertificateRow, equal, said
-from repair.curves.base import Curve, SplicedCurve
+from repair.curves.base import Curve
 from repair.errors import RepairError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _FREE = frozenset(
 #: What follows from the scenario, the configuration and the curve alone.
 _DIRECT = (
     "schema", "scenario", "backend", "ttc_s", "contact_ttc_s", "conflict", "reference", "t_end_s", "limits",
-    "notes", "trajectory", "peak_deceleration_mps2", "peak_acceleration_mps2",
+    "notes", "trajectory", "terminal", "peak_deceleration_mps2", "peak_acceleration_mps2",
     "peak_lateral_acceleration_mps2", "peak_total_acceleration_mps2", "min_speed_mps", "max_speed_mps",
 )  # fmt: skip
 _EXACT, _SOLVED = 1e-6, 1e-4  # a solver on another machine ends a little elsewhere
@@ -97,6 +97,7 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
     from repair.baselines.evasive.at_ttr import AtTtr
     from repair.metrics.base import Asked
     from repair.metrics.registry import measure
+    from repair.outcome.driven import what_is_driven
     from repair.outcome.record import record_of
     from repair.search.search import search_f_ttr
     from repair.solvers.registry import make_backend
@@ -109,18 +110,15 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
         capabilities, at_ttr = backend.capabilities, config.driver == "at_ttr"
         around = AtTtr(prepared.source, asked.evasive) if at_ttr else None
         found = search_f_ttr(
-            around or prepared.source, prepared.conflict, backend, prepared.checker,
+            around or prepared.source, prepared.conflict, backend, prepared.judge,
             replace(config.search, time_limit=None), visits=around.visits if around else None,
         )  # fmt: skip
         wanted += ["ttr"] if at_ttr and found.complete and "ttr" not in wanted else []
-    driven, t_end, reached = prepared.reference, prepared.t_reference, None
-    if found.curve is not None:
-        t_rep = float(found.f_ttr or 0.0)
-        driven, t_end = SplicedCurve(prepared.reference, found.curve, t_rep), prepared.t_end
-        reached = prepared.checker.peaks(driven, t_end, t_rep)
-    states = prepared.checker.drive(driven, t_end).every(config.checker.substeps)
+    driven = what_is_driven(prepared, found)
     metrics = measure(wanted, asked) if wanted else {}
-    return record_of(prepared, found, states, reached, {}, metrics, capabilities)
+    return record_of(
+        prepared, found, driven.states, driven.peaks, {}, metrics, capabilities, terminal=driven.terminal
+    )
 
 
 def differences(said: Any, made: Any, tolerance: float, path: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.scene.traffic.rows import continued_from
 from repair.world.collision import CollisionWorld
 
 if TYPE_CHECKING:
@@ -66,30 +66,5 @@ def _last(obstacle: Obstacle) -> int | None:
 
 def _moved_on(obstacle: Obstacle, last: int, dt: float) -> Obstacle:
     """The obstacle from the end of its prediction on alone, moved on as it moved last."""
-    heading, speed = obstacle.states[last, 2:]
-    shift = np.zeros(2)
-    if np.isfinite(heading) and np.isfinite(speed):
-        shift = speed * dt * np.array([np.cos(heading), np.sin(heading)])
-    elif last > 0 and np.isfinite(obstacle.states[last - 1, :2]).all():
-        shift = obstacle.states[last, :2] - obstacle.states[last - 1, :2]
-    ahead = (np.arange(obstacle.n_steps + 1) - last)[:, None] * shift
-
-    def rows(known: Array) -> Array:
-        made = np.repeat(known[last : last + 1], len(known), axis=0)
-        made[:, :2] += ahead
-        made[:last] = np.nan
-        return frozen(made)
-
-    shapes = obstacle.polygons[last] if obstacle.polygons else ()
-    return replace(
-        obstacle,
-        rectangles=None if obstacle.rectangles is None else rows(obstacle.rectangles),
-        circles=None if obstacle.circles is None else rows(obstacle.circles),
-        polygons=tuple(
-            () if k < last else tuple(part + way for part in shapes) for k, way in enumerate(ahead)
-        )
-        if obstacle.polygons
-        else (),
-        states=rows(obstacle.states),
-        late=0,
-    )
+    made = continued_from(obstacle, last, obstacle.n_steps, "constant_velocity", dt, alone=True)
+    return replace(made, late=0)

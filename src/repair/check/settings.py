@@ -40,6 +40,19 @@ class CheckerConfig:
         0.1, "safety margin around the ego's rectangle, for conflict and repair alike [m]", low=0.0, high=5.0
     )
     tolerance: float = setting(0.0, "share of every limit by which a repair may exceed it", low=0.0, high=0.1)
+    terminal: str = setting(
+        "report",
+        "whether the vehicle can be brought to rest after a repair: nobody asks, the result says it, or "
+        "a repair after which it cannot is none",
+        choices=("off", "report", "require"),
+    )
+    terminal_wait: float = setting(
+        0.0,
+        "how long the vehicle that has come to rest after a repair still may not be met [s]",
+        low=0.0,
+        high=60.0,
+        only_with=("checker.terminal", ("report", "require")),
+    )
     extra: list[str] = setting(
         factory=list, says="registered checks that a repair has to pass too", registry="check"
     )

@@ -20,6 +20,7 @@ class Reason(str, Enum):
     NOT_SOLVED = "not_solved"
     NO_CORRIDOR = "no_corridor"
     NO_PASSAGE = "no_passage"
+    UNSAFE_END = "unsafe_end"
     EXTRA = "extra"  # of a registered check; the particulars say which
 
 

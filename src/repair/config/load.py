@@ -7,6 +7,7 @@ chosen backend. A preset uses ``for_backend`` where a published setting belongs 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -145,7 +146,11 @@ def _validated(found: Any) -> Config:
     except OmegaConfBaseException as error:
         raise ConfigError(explain("configuration", error, key_names())) from error
     for key, value in zip(configuration_keys(), values_of(config).values(), strict=True):
-        require_sane(key, value, words_of(key))
+        words = words_of(key)
+        if value == "False" and "off" in (words or ()):  # YAML reads a bare `off` as false
+            value, (*sections, name) = "off", key.name.split(".")
+            setattr(reduce(getattr, sections, config), name, value)
+        require_sane(key, value, words)
     assert isinstance(config, Config)
     return config
 

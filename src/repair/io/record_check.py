@@ -98,6 +98,22 @@ _TRAJECTORY: dict[str, Test] = {
         for name in ("t_s", "x_m", "y_m", "orientation_rad", "steering_rad", "speed_mps", "s_m", "l_m")
     },
 }
+_DETAIL: Mapping[str, Test] = {
+    "reason": _text, "t_s": _maybe(_number), "detail": _text, "obstacle_id": _maybe(_whole),
+}  # fmt: skip
+_TERMINAL: Mapping[str, Test] = {
+    "ending": lambda value: value in ("safe", "safe_unless_extended", "unsafe"),
+    "sentence": _text,
+    "maneuver": _maybe(_text),
+    **{
+        key: _maybe(_number)
+        for key in ("from_s", "stands_s", "checked_until_s", "offset_m", "peak_deceleration_mps2")
+    },
+    "extended": _table_of(_maybe(_all_of(_DETAIL))),
+    "details": _list_of(_all_of(_DETAIL)),
+    "tried": _whole,
+    "trajectory": _maybe(_table_of(_list_of(_number))),
+}
 #: What every result has had since there are results.
 _NEEDED: dict[str, Test] = {
     "scenario": _text,
@@ -141,6 +157,7 @@ _OTHERS: dict[str, Test] = {
     "checks_off": _list_of(_text),
     "checked_until_s": _maybe(_number),
     "prediction_end": _maybe(_table_of(_number)),
+    "terminal": _maybe(_all_of(_TERMINAL)),
     "limits": _table_of(_maybe(_number)),
     "versions": lambda value: isinstance(value, dict),
 }

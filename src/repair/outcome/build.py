@@ -14,6 +14,7 @@ from repair.outcome.record import record_of
 from repair.preparation import Prepared
 from repair.search.modes import ModeResult
 from repair.search.result import SearchResult
+from repair.terminal.verdict import Terminal
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["outcome_of"]
@@ -29,7 +30,8 @@ def outcome_of(
     capabilities: Capabilities,
     modes: Sequence[ModeResult] = (),
     bounds: Mapping[str, Bound] | None = None,
+    terminal: Terminal | None = None,
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
-    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds)
-    return Outcome(record, drawing_of(prepared, found, states))
+    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal)
+    return Outcome(record, drawing_of(prepared, found, states, terminal))

@@ -18,9 +18,10 @@ class Line:
     Attributes
     ----------
     kind : str
-        ``reference``; ``repair``, of a visited time-to-repair; ``stage``, on the way to it.
+        ``reference``; ``repair``, of a visited time-to-repair; ``stage``, on the way to it; ``continuation``,
+        the stop after the repair.
     name : str
-        Of the stage, else empty.
+        Of the stage; of a continuation how safe that end is; else empty.
     t_rep : float or None
         Where it leaves the reference [s].
     t, s, l, x, y, speed, acceleration : (K,) array

@@ -10,6 +10,7 @@ from repair.outcome.data import Body, Box, Drawing, Line
 from repair.preparation import Prepared
 from repair.scene.traffic.obstacle import Obstacle
 from repair.search.result import SearchResult, SearchStatus
+from repair.terminal.verdict import Terminal
 from repair.timegrid import INSTANT
 from repair.vehicle.states import DrivenStates
 
@@ -20,7 +21,9 @@ _AROUND = 20.0  # road and traffic are shown at least this far beyond what is dr
 _STAYS = 0.5  # who moves less than this in all stands [m]
 
 
-def drawing_of(prepared: Prepared, found: SearchResult, states: DrivenStates) -> Drawing:
+def drawing_of(
+    prepared: Prepared, found: SearchResult, states: DrivenStates, terminal: Terminal | None = None
+) -> Drawing:
     """Lines, boxes, road and traffic of a result.
 
     Parameters
@@ -29,6 +32,8 @@ def drawing_of(prepared: Prepared, found: SearchResult, states: DrivenStates) ->
     found : SearchResult
     states : DrivenStates
         What is driven, at the scenario's steps.
+    terminal : Terminal or None
+        How the repair ends.
     """
     scene, dt = prepared.scene, prepared.scene.dt
     until = prepared.t_end if found.probes else prepared.t_reference
@@ -36,7 +41,7 @@ def drawing_of(prepared: Prepared, found: SearchResult, states: DrivenStates) ->
     moment, end = round(at / dt), round(until / dt)
     # The conflict first: where labels would cover each other, the earlier one stays.
     steps = tuple(dict.fromkeys([moment, 0, end, moment // 2]))
-    lines = _lines(prepared, found, until)
+    lines = (*_lines(prepared, found, until), *_continuation(prepared, terminal))
     driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
     seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])
     # A figure is at least as high as a fifth of its width, and shows that much road.
@@ -91,6 +96,18 @@ def _line(prepared: Prepared, curve: Curve, t_rep: float | None, kind: str, name
         k &= path.t <= until + INSTANT
     columns = (path.t, *samples.position.T, *path.xy.T, path.speed, acceleration)
     return Line(kind, name, t_rep, *(_rounded(column[k]) for column in columns))
+
+
+def _continuation(prepared: Prepared, terminal: Terminal | None) -> tuple[Line, ...]:
+    """The stop after the repair, at the scenario's steps."""
+    if terminal is None or terminal.continuation is None:
+        return ()
+    stop = terminal.continuation.stop
+    count = round((stop.t_end - stop.t_start) / prepared.scene.dt) * prepared.config.checker.substeps
+    samples = stop.sample(np.linspace(stop.t_start, stop.t_end, count + 1))
+    path = prepared.scene.frame.cartesian(samples)
+    columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
+    return (Line("continuation", terminal.ending.value, None, *(_rounded(column) for column in columns)),)
 
 
 def _boxes(prepared: Prepared, t_end: float) -> tuple[Box, ...]:

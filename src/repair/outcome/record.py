@@ -8,26 +8,27 @@ from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-import numpy as np
-
-from repair.arrays import column, number
+from repair.arrays import number
 from repair.backend.base import Capabilities, SolveResult
 from repair.bounds.latest import Bound
 from repair.check.beyond import Beyond, met_beyond
 from repair.check.peaks import Peaks
-from repair.curves.base import Curve, SplicedCurve
+from repair.curves.base import SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
 from repair.outcome.bound_record import bound_to_dict
+from repair.outcome.driven import driven_curve
+from repair.outcome.ending import columns_of, detail_of, place_of, terminal_to_dict
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
 from repair.search.modes import ModeResult
 from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.terminal.verdict import Terminal
 from repair.vehicle.states import DrivenStates
 
-__all__ = ["driven_curve", "peaks_to_dict", "probe_peaks", "record_of"]
+__all__ = ["peaks_to_dict", "probe_peaks", "record_of"]
 
 _PACKAGES = (
     "commonroad-repair", "numpy", "scipy", "casadi", "qpsolvers", "osqp", "daqp", "clarabel", "shapely",
@@ -45,6 +46,7 @@ def record_of(
     capabilities: Capabilities,
     modes: Sequence[ModeResult] = (),
     bounds: Mapping[str, Bound] | None = None,
+    terminal: Terminal | None = None,
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -66,6 +68,8 @@ def record_of(
         What each of several predictions of an obstacle alone would allow.
     bounds : mapping, optional
         From when on it is proven too late, by kind.
+    terminal : Terminal or None
+        How the repair ends.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -96,7 +100,7 @@ def record_of(
             "from_behind": conflict.from_behind,
             "margin_only": margin_only(conflict),
             "detail": str(getattr(conflict, "detail", "")),
-            "place_m": _place(conflict.place),
+            "place_m": place_of(conflict.place),
         },
         "bound": bound_to_dict(prepared, found, bounds or {}),
         "metrics": {name: _metric(value) for name, value in metrics.items()},
@@ -104,6 +108,7 @@ def record_of(
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,
         **peaks_to_dict(peaks),
         "probes": [_probe(prepared, p) for p in found.probes],
+        "terminal": terminal_to_dict(terminal),
         "curve": curve_to_dict(found.curve),
         "reference": curve_to_dict(prepared.reference, prepared.t_reference),
         "given_reference": None if prepared.given is None else prepared.given.plain,
@@ -165,16 +170,7 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "t_rep_s": number(probe.t_rep),
         "feasible": probe.feasible,
         "reasons": list(probe.verdict.reasons),
-        "details": [
-            {
-                "reason": v.reason.value,
-                "t_s": number(v.time),
-                "detail": v.detail,
-                "obstacle_id": getattr(v, "obstacle_id", None),
-                "place_m": _place(v.place),
-            }
-            for v in probe.verdict.violations
-        ],
+        "details": [detail_of(v) for v in probe.verdict.violations],
         "maneuver": probe.maneuver.value if probe.maneuver is not None else None,
         "margin_m": number(probe.margin),
         "tried": list(probe.tried),
@@ -202,36 +198,16 @@ def _mode(mode: ModeResult) -> dict[str, Any]:
     }
 
 
-def _place(place: tuple[float, float] | None) -> list[float | None] | None:
-    return None if place is None else [number(value, 3) for value in place]
-
-
 def _metric(metric: MetricValue) -> dict[str, Any]:
     return {f"value_{metric.unit}": number(metric.value), "status": metric.status}
 
 
-def driven_curve(prepared: Prepared, found: SearchResult) -> Curve:
-    """What is driven, in the Frenet frame; the reference where there is no repair."""
-    if found.curve is None:
-        return prepared.reference
-    return SplicedCurve(prepared.reference, found.curve, float(found.f_ttr or 0.0))
-
-
 def _trajectory(prepared: Prepared, found: SearchResult, states: DrivenStates) -> dict[str, Any]:
     """What is driven, at the scenario's steps; centre of the vehicle, speed at the rear axle."""
-    along = driven_curve(prepared, found).sample(states.t)
-    wrapped = np.arctan2(np.sin(states.orientation), np.cos(states.orientation))
     return {
         "initial_time_step": prepared.scene.initial_time_step,
         "dt_s": number(prepared.scene.dt),
-        "t_s": column(states.t),
-        "x_m": column(states.x),
-        "y_m": column(states.y),
-        "orientation_rad": column(wrapped),
-        "steering_rad": column(states.steering),
-        "speed_mps": column(states.speed),
-        "s_m": column(along.position[:, 0]),
-        "l_m": column(along.position[:, 1]),
+        **columns_of(states, driven_curve(prepared, found)),
     }
 
 

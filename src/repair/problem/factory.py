@@ -146,9 +146,16 @@ class ProblemFactory:
         passing = Passing(kind, path, sides_of(guide.position, lower, upper), 0.0)
         return self._problem(t_rep, start, occupancy, settings.margin, passing, lateral)
 
+    def plain(self, t_rep: float) -> RepairProblem:
+        """The problem at a t_rep without a way past the obstacles: to judge a curve by, not to solve."""
+        state = self.reference.sample([t_rep])
+        start = frozen([state.position[0], state.velocity[0], state.acceleration[0]])
+        return self._problem(t_rep, start, self.occupancy, self.settings.margin, None, True)
+
     def _problem(
-        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing, lateral: bool
-    ) -> RepairProblem:
+        self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing | None,
+        lateral: bool,
+    ) -> RepairProblem:  # fmt: skip
         s, curvature = self._axis
         return RepairProblem(
             reference=self.reference,

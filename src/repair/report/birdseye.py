@@ -9,7 +9,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Drawing, Outcome
-from repair.report.lines import drawing_in, reference_line, repair_lines, title_of
+from repair.report.lines import continuation_lines, drawing_in, reference_line, repair_lines, title_of
 from repair.report.style import EGO, OBSTACLE, OTHERS, REFERENCE, STYLE, WIDTH
 
 __all__ = ["birdseye_figure"]
@@ -45,6 +45,8 @@ def birdseye_figure(outcome: Outcome) -> Any:
         for repair in repair_lines(outcome):
             label = repair.label if repair.feasible else f"{repair.label.splitlines()[0]}, infeasible"
             axes.plot(repair.line.x, repair.line.y, label=label, zorder=4, **repair.style)
+        for stop in continuation_lines(outcome):
+            axes.plot(stop.line.x, stop.line.y, label=stop.label.replace("\n", " "), zorder=4.2, **stop.style)
         _draw_vehicles(axes, outcome, window)
         _draw_departures(axes, outcome)
         axes.set(
@@ -63,7 +65,8 @@ def birdseye_figure(outcome: Outcome) -> Any:
 def _window(drawing: Drawing) -> tuple[_Window, float]:
     """Ranges of x and y that hold all that is driven with some room, and their ratio of height to width."""
     reference = drawing.lines[0]
-    points = np.vstack([np.column_stack([reference.x, reference.y]), drawing.ego[:, :2]])
+    driven = [reference, *(line for line in drawing.lines if line.kind == "continuation")]
+    points = np.vstack([*(np.column_stack([line.x, line.y]) for line in driven), drawing.ego[:, :2]])
     road = np.vstack(drawing.edges) if drawing.edges else points
     # No further than the road goes.
     low = np.maximum(points.min(axis=0) - 10.0, road.min(axis=0) - 2.0)

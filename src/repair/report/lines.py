@@ -10,10 +10,10 @@ import numpy as np
 from repair.errors import OutputError
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Drawing, Line, Outcome
-from repair.report.style import REFERENCE
+from repair.report.style import EGO, OBSTACLE, REFERENCE
 from repair.timegrid import STEP
 
-__all__ = ["Styled", "drawing_in", "reference_line", "repair_lines", "title_of"]
+__all__ = ["Styled", "continuation_lines", "drawing_in", "reference_line", "repair_lines", "title_of"]
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,18 @@ def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) ->
     style = {"color": colour, "lw": 2.4 if best else 1.5, "ls": "-" if probe["feasible"] else (0, (4, 2))}
     label = f"$t_{{rep}}$ = {probe['t_rep_s']:g} s{verdict}"
     return Styled(line, label, style, bool(probe["feasible"]))
+
+
+def continuation_lines(outcome: Outcome) -> list[Styled]:
+    """The stop after the repair, dash-dotted; red where it fails."""
+    return [
+        Styled(
+            line, f"stop after it,\n{line.name.replace('_', ' ')}",
+            {"color": OBSTACLE if line.name == "unsafe" else EGO, "lw": 1.4, "ls": "-."},
+        )
+        for line in drawing_in(outcome).lines
+        if line.kind == "continuation"
+    ]  # fmt: skip
 
 
 def title_of(outcome: Outcome) -> str:

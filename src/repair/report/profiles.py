@@ -10,7 +10,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Outcome
-from repair.report.lines import Styled, drawing_in, reference_line, repair_lines, title_of
+from repair.report.lines import Styled, continuation_lines, drawing_in, reference_line, repair_lines, title_of
 from repair.report.style import EGO, OBSTACLE, STYLE, WIDTH
 from repair.timegrid import INSTANT, STEP
 
@@ -24,7 +24,8 @@ def profile_figure(outcome: Outcome) -> Any:
     -------
     matplotlib.figure.Figure
     """
-    return _profiles(outcome, [reference_line(outcome), *repair_lines(outcome)], title_of(outcome))
+    lines = [reference_line(outcome), *repair_lines(outcome), *continuation_lines(outcome)]
+    return _profiles(outcome, lines, title_of(outcome))
 
 
 def stages_figure(outcome: Outcome, t_rep: float | None = None) -> Any:

@@ -68,6 +68,8 @@ def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[s
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))
+    if content.get("terminal"):
+        rows.append(("After it", _after(content["terminal"])))
     if content.get("metrics"):  # results of earlier versions have none
         rows.append(("Metrics", _metrics(content["metrics"])))
     if not content["complete"]:
@@ -114,6 +116,32 @@ def _f_ttr(content: dict[str, Any]) -> str:
         how = f", {content['maneuver'].replace('_', ' ')}" if content["maneuver"] else ""
         return f"{content['f_ttr_s']:.2f} s{how}"
     return "unlimited: there is nothing to react to" if content["status"] == "no_conflict" else "none"
+
+
+_STOPS = {
+    "stand": "it stands", "brake": "full braking", "swerve_left": "braking and swerving left",
+    "swerve_right": "braking and swerving right",
+}  # fmt: skip
+
+
+def _after(terminal: dict[str, Any]) -> str:
+    """How safe the end of a repair is, and what shows it."""
+    text = str(terminal["ending"]).replace("_", " ")
+    if terminal["maneuver"] and terminal["ending"] != "unsafe":
+        text += f": {_STOPS.get(terminal['maneuver'], terminal['maneuver'])}"
+        text += f", at rest at {fixed(terminal['stands_s'])} s"
+    met: dict[str, list[str]] = {}
+    for how, one in terminal["extended"].items():
+        if one is not None:
+            words = f"{one['detail'] or one['reason']} at {fixed(one['t_s'])} s"
+            met.setdefault(words, []).append(how.replace("_", " "))
+    text += "".join(f"; beyond its prediction ({' or '.join(hows)}): {words}" for words, hows in met.items())
+    if terminal["ending"] == "unsafe":
+        first = min(terminal["details"], key=lambda one: one["t_s"] or 0.0)
+        text += f": of {terminal['tried']} stops none passes every check; full braking fails at "
+        text += f"{fixed(first['t_s'])} s, {first['reason'].replace('_', ' ')}"
+        text += f": {first['detail']}" if first["detail"] else ""
+    return text
 
 
 def _metrics(metrics: dict[str, Any]) -> str:

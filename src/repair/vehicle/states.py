@@ -42,3 +42,11 @@ class DrivenStates:
         return DrivenStates(
             self.t[::n], self.x[::n], self.y[::n], self.steering[::n], self.speed[::n], self.orientation[::n]
         )
+
+    def since(self, t: float) -> DrivenStates:
+        """The states from a time [s] on."""
+        late = self.t >= t
+        return DrivenStates(
+            self.t[late], self.x[late], self.y[late], self.steering[late], self.speed[late],
+            self.orientation[late],
+        )  # fmt: skip

@@ -12,7 +12,7 @@ from repair.errors import ScenarioError
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.shapes import FAR, Placed, polygons_of, subdivided
 
-__all__ = ["obstacle_of_rows", "repeated", "require_sane", "rigid_outline"]
+__all__ = ["continued_from", "obstacle_of_rows", "repeated", "require_sane", "rigid_outline"]
 
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
@@ -87,6 +87,57 @@ def repeated(obstacle: Obstacle, count: int) -> Obstacle:
         circles=None if obstacle.circles is None else wide(obstacle.circles),
         polygons=obstacle.polygons * count,
         states=wide(obstacle.states),
+    )
+
+
+def continued_from(
+    obstacle: Obstacle, last: int, n_steps: int, how: str, dt: float, *, alone: bool = False
+) -> Obstacle:
+    """The obstacle with ``n_steps + 1`` rows, after row ``last`` as ``how`` says.
+
+    Parameters
+    ----------
+    obstacle : Obstacle
+    last : int
+        The last row that is known.
+    n_steps : int
+    how : str
+        ``remove``, ``hold`` or ``constant_velocity``: at its last velocity, which without one is its last
+        step.
+    dt : float
+        Time step [s].
+    alone : bool
+        Leave out what comes before ``last``.
+    """
+    shift = np.zeros(2)
+    if how == "constant_velocity":
+        heading, speed = obstacle.states[last, 2:]
+        if np.isfinite(heading) and np.isfinite(speed):
+            shift = speed * dt * np.array([np.cos(heading), np.sin(heading)])
+        elif last > 0 and np.isfinite(obstacle.states[last - 1, :2]).all():
+            shift = obstacle.states[last, :2] - obstacle.states[last - 1, :2]
+    ahead = (np.arange(last + 1, n_steps + 1) - last)[:, None] * shift
+
+    def rows(known: Array) -> Array:
+        made = np.empty((n_steps + 1, *known.shape[1:]))
+        made[: last + 1] = known[: last + 1]
+        if alone:
+            made[:last] = np.nan
+        made[last + 1 :] = np.nan if how == "remove" else known[last]
+        if how != "remove" and ahead.any():
+            made[last + 1 :, ..., :2] += ahead.reshape(-1, *(1,) * (known.ndim - 2), 2)
+        return frozen(made)
+
+    shapes = obstacle.polygons[last] if obstacle.polygons else ()
+    before = ((),) * last if alone else obstacle.polygons[:last]
+    more = tuple(() if how == "remove" else tuple(part + way for part in shapes) for way in ahead)
+    return replace(
+        obstacle,
+        vertices=rows(obstacle.vertices),
+        rectangles=None if obstacle.rectangles is None else rows(obstacle.rectangles),
+        circles=None if obstacle.circles is None else rows(obstacle.circles),
+        polygons=(*before, shapes, *more) if obstacle.polygons else (),
+        states=rows(obstacle.states),
     )
 
 

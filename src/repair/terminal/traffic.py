@@ -1,0 +1,116 @@
+"""Traffic for longer than a scene looks ahead, and what becomes of it where its predictions end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repair.scene.traffic.obstacle import Obstacle
+from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
+from repair.scene.traffic.rows import continued_from
+
+if TYPE_CHECKING:
+    from repair.scene.scene import Scene
+
+__all__ = ["extended", "traffic_until"]
+
+
+def traffic_until(scene: Scene, n_steps: int) -> tuple[Obstacle, ...]:
+    """The obstacles of a scene with ``n_steps + 1`` rows, at least as many as they have.
+
+    What the file predicts beyond the scene's horizon is read from it, those included that come later; after
+    that they are as ``scene.after_prediction`` has it.
+
+    Parameters
+    ----------
+    scene : Scene
+    n_steps : int
+        Index of the last row.
+    """
+    how = scene.settings.after_prediction
+    found: list[Obstacle] = []
+    for obstacle in scene.obstacles:
+        last = _last_step(obstacle, scene.initial_time_step)
+        if obstacle.source is not None and last is not None and last > scene.n_steps:
+            found += _read([obstacle.source], scene, n_steps, how)
+        else:
+            found.append(_longer(obstacle, n_steps, how, scene.dt))
+    return (*found, *_later(scene, n_steps, how))
+
+
+def extended(scene: Scene, known: Iterable[Obstacle], n_steps: int, how: str) -> tuple[Obstacle, ...]:
+    """Those of the obstacles whose prediction ends before ``n_steps``, as they go on after it.
+
+    Parameters
+    ----------
+    scene : Scene
+    known : iterable of Obstacle
+        What :func:`traffic_until` gave for ``n_steps``.
+    n_steps : int
+    how : str
+        ``hold`` or ``constant_velocity``.
+    """
+    loaded = scene.settings.after_prediction
+    found: list[Obstacle] = []
+    for obstacle in known:
+        last = _last_step(obstacle, scene.initial_time_step)
+        restarts = _unpredicted(obstacle) and how == "constant_velocity"
+        if obstacle.source is not None and (restarts or (last is not None and loaded not in ("remove", how))):
+            found += _read([obstacle.source], scene, n_steps, how)
+        elif not np.isfinite(obstacle.states[n_steps, 0]):
+            found.append(replace(_longer(obstacle, n_steps, how, scene.dt), late=0))
+    return tuple(found)
+
+
+def _last_step(obstacle: Obstacle, first: int) -> int | None:
+    """The last step that the file predicts, counted from the start; None for what has no prediction."""
+    if obstacle.source is None:
+        return None
+    last = last_predicted_step(_only([obstacle.source]))
+    return None if last is None else last - first
+
+
+def _unpredicted(obstacle: Obstacle) -> bool:
+    """It could move, and the file does not say how."""
+    source = obstacle.source
+    return obstacle.role == "dynamic" and source is not None and source.prediction is None
+
+
+def _only(sources: list[Any], dt: float = 0.0) -> Any:
+    """What looks like a scenario with these obstacles."""
+    return SimpleNamespace(static_obstacles=sources, dynamic_obstacles=[], dt=dt)
+
+
+def _read(sources: list[Any], scene: Scene, n_steps: int, how: str) -> tuple[Obstacle, ...]:
+    return obstacles_of(
+        _only(sources, scene.dt), first_step=scene.initial_time_step, n_steps=n_steps, after_prediction=how
+    )[0]
+
+
+def _later(scene: Scene, n_steps: int, how: str) -> tuple[Obstacle, ...]:
+    """Obstacles that are there only after the scene's horizon."""
+    last = last_predicted_step(scene.scenario)
+    if last is None or last - scene.initial_time_step <= scene.n_steps or n_steps <= scene.n_steps:
+        return ()
+    known = {id(obstacle.source) for obstacle in scene.obstacles}
+    others = [o for o in scene.scenario.dynamic_obstacles if id(o) not in known]
+    came = _read(others, scene, n_steps, how)
+    return tuple(o for o in came if np.isnan(o.states[: scene.n_steps + 1, 0]).all())
+
+
+def _longer(obstacle: Obstacle, n_steps: int, how: str, dt: float) -> Obstacle:
+    """As :func:`continued_from`, after the last row at which it is there; what stands, stands on."""
+    there = np.flatnonzero(np.isfinite(obstacle.states[:, 0]))
+    if not len(there):
+        return continued_from(obstacle, obstacle.n_steps, max(n_steps, obstacle.n_steps), "remove", dt)
+    last = int(there[-1])
+    stands = obstacle.role in ("static", "environment")
+    if stands or _unpredicted(obstacle):
+        how = "hold"
+    if how == "remove" and n_steps == obstacle.n_steps:
+        return obstacle
+    return continued_from(obstacle, last, n_steps, how, dt)
