@@ -24,6 +24,7 @@ __all__ = ["Settling", "Stop", "settling_from", "stop_along"]
 _RESERVE = 0.98  # share of every limit that a stop uses: it is laid out by samples, and checked at all times
 _SPACING = 0.25  # at which the path is looked at [m]
 _STANDS = 1e-2  # below this speed [m/s] a path has no direction
+_RESTS = 1e-6  # what is slower than this is at rest, whatever its last digits [m/s]
 _LONGEST = 60.0  # who has not come to rest by then never will [s]
 
 
@@ -147,7 +148,7 @@ def stop_along(
     places = s + np.arange(0.0, reach + _SPACING, _SPACING)
     forward, along, across = _demands(path, frame, places)
     phases, since = [], 0.0
-    while v > 0.0:
+    while v > _RESTS:
         low, high = ((x - begin) / _SPACING for x in (s, s + v * dt))
         here = slice(int(low), min(int(high) + 2, len(places)))
         if here.start >= len(places) - 1 or since > _LONGEST:
@@ -160,8 +161,6 @@ def stop_along(
         rate = min(rate, v / dt)
         phases.append((since, s, v, -rate))
         s, v, since = s + v * dt - 0.5 * rate * dt**2, v - rate * dt, since + dt
-        if v < 1e-9:
-            v = 0.0
     phases.append((since, s, 0.0, 0.0))
     end = (max(steps_until(t + since, dt), steps_until(t, dt) + 1)) * dt
     return Stop(t, end, frozen(phases), path)
