@@ -122,7 +122,7 @@ class EndJudge:
 
             def judge(obstacles: tuple[Obstacle, ...]) -> Checker:
                 later = replace(scene, n_steps=n_steps, horizon=n_steps * scene.dt, obstacles=obstacles)
-                return Checker(later, checker.limits, config, checker)
+                return Checker(later, checker.limits, config, checker.reference_limits, like=checker)
 
             others = {how: judge(extended(scene, known, n_steps, how)) for how in EXTENSIONS}
             self._made = _Judges(n_steps, judge(known), others)
