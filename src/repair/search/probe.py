@@ -120,7 +120,8 @@ def probe_sides(
         nothing = SolveResult(SolveStatus.INFEASIBLE, detail="no manoeuvre past the obstacles is open")
         why = Violation(Reason.NO_PASSAGE, t_rep, "every manoeuvre that was tried collides within the limits")
         return Probe(t_rep, nothing, Verdict((why,))), rejected
-    return replace(best, tried=tuple(tried)), rejected
+    whole = Probe(t_rep, best.solve, best.verdict, best.maneuver, best.check_time, tuple(tried), best.margin)
+    return whole, rejected
 
 
 def probe_one(

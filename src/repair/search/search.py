@@ -92,7 +92,10 @@ def _visit(
     """One t_rep, with its first problems and then with other margins."""
     budget.cut = False
     probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
-    if not probe.feasible:
+    if probe.feasible:
+        return probe
+    tightens = any(source.notches)
+    if tightens:
         probe = probe_again(
             probe, rejected, source,
             lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
@@ -101,7 +104,7 @@ def _visit(
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
     others: list[Iterable[Sequence[RepairProblem]]] = []
-    if too_close(rejected):
+    if tightens and too_close(rejected):
         others.append(other_ways(first, source.widened(t_rep)))
     if backend.capabilities.relaxes:
         others.append(source.relaxed(t_rep))
