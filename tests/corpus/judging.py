@@ -86,7 +86,7 @@ class Judge:
             words = ""
             if self.road.inside(_until(ego, until)).all():
                 words = "the ego is within the lanelets"
-            elif reference == "constant" and speed > 0.5:
+            elif reference == "constant" and speed > 0.5 and self.road.inside(_until(ego, 0.0)).all():
                 size, lanes = (ego.length, ego.width), checked.route_lanelets
                 lane = lane_drive(self.scenario, lanes, self.start, speed, until + 0.5, size)
                 if lane is not None and self.road.inside(lane).all():

@@ -116,6 +116,14 @@ def test_a_reference_off_the_road_that_nobody_told(tmp_path: Path) -> None:
     assert "off_road" in kinds(found)
 
 
+def test_a_start_beside_the_road_is_rightly_off_it(tmp_path: Path) -> None:
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    beside = roads.problem(start=roads.state(20.0, 1.4))
+    file.write_text(roads.scenario(obstacles="", problems=beside), encoding="utf-8")
+    found = examine(file, replace(QUICK, invariance=False))
+    assert (found.rows[0].ttc, kinds(found)) == (0.0, set())
+
+
 def test_a_traceback(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("repair.preparation.detect_conflict", lambda *_: 1 / 0)
     found = examine(file, replace(QUICK, invariance=False))
