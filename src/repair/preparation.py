@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
 from repair.check.verdict import Reason
@@ -196,7 +197,14 @@ def laid_out(
         conflict=conflict,
         t_reference=t_reference,
         t_end=float(t_end),
-        notes=(*scene.notes, *said, *notes, *more, *_remarks(config, wanted, t_reference)),
+        notes=(
+            *scene.notes,
+            *_bridged(checker, places),
+            *said,
+            *notes,
+            *more,
+            *_remarks(config, wanted, t_reference),
+        ),
         config=config,
         phases=phases.seconds,
         given=given,
@@ -250,6 +258,22 @@ def _agreed(scene: Scene, config: Config) -> Config:
     agreed = replace(config, scene=replace(config.scene, **{name: getattr(loaded, name) for name in LOADING}))
     agreed.given = config.given
     return agreed
+
+
+def _bridged(checker: Checker, places: Array) -> list[str]:
+    """Gaps and holes of the map that count as road and that the reference drives over.
+
+    Parameters
+    ----------
+    places : (K, 2) array
+        ``[s, l]`` of the reference at the scenario's steps.
+    """
+    if checker.road is None or not np.isfinite(places).all():
+        return []
+    import shapely
+
+    driven = shapely.LineString(checker.scene.frame.to_cartesian(*places.T))
+    return [str(one) for one in checker.road.bridged(driven.buffer(checker.scene.vehicle.half_width))]
 
 
 def _remarks(config: Config, wanted: float, t_reference: float) -> list[str]:

@@ -198,7 +198,7 @@ def test_start_beside_the_road() -> None:
     with pytest.raises(ScenarioError, match="from the nearest lanelet"):
         scene(two_lanes(), state(20.0, -40.0))
     with pytest.raises(ScenarioError, match="degrees away"):
-        scene(two_lanes()[:2], state(20.0, 0.0, heading=3.0))
+        scene(two_lanes()[:2], state(20.0, 0.0, heading=2.0))
 
 
 @pytest.mark.parametrize("degrees", [-95.0, -60.0, -20.0, 20.0, 60.0, 95.0])

@@ -26,7 +26,7 @@ class CheckerConfig:
     )
     road: bool = setting(True, "the ego's rectangle stays on the road")
     road_gap: float = setting(
-        0.1, "gaps and holes of the map up to this width are road [m]", low=0.0, high=2.0
+        0.35, "gaps and holes of the map up to this width are road [m]", low=0.0, high=2.0
     )
     limits: bool = setting(True, "the repaired part keeps the limits")
     margin: bool = setting(False, "the repaired part keeps out of the inflated boxes, as the TTC has it")

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from repair.cli import certify, info, paper, run, sweep
+from repair.cli import certify, info, paper, run, scenarios, sweep
 from repair.cli.arguments import UsageError, no_arguments
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
@@ -50,6 +50,12 @@ class Verb:
 VERBS: tuple[Verb, ...] = (
     Verb("run", "repair one scenario: TTC, F-TTR, a checked trajectory", run.run_arguments, run.run),
     Verb("certify", "recompute every margin of a written result", certify.certify_arguments, certify.certify),
+    Verb(
+        "scenarios",
+        "what files hold: ego, traffic, route, and what of the map was bridged",
+        scenarios.scenarios_arguments,
+        scenarios.scenarios,
+    ),
     Verb("sweep", "repair all scenarios of a folder", sweep.sweep_arguments, sweep.sweep),
     Verb("table1", "the paper's Table I, paper and ours", paper.table1_arguments, paper.table1),
     Verb("table2", "the paper's Table II, times on this machine", paper.table2_arguments, paper.table2),

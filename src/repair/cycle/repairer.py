@@ -30,8 +30,8 @@ from repair.outcome.data import Outcome
 from repair.preparation import Phases, Prepared, laid_out
 from repair.reference.given import GivenReference, given_reference
 from repair.scene.commonroad import load_scene, moved_on
-from repair.scene.reframe import reframe
-from repair.scene.road.lanes import Lane, lanes_of
+from repair.scene.reframe import lanes_at, reframe
+from repair.scene.road.lanes import Lane
 from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.given_rows import given_obstacles
 from repair.scene.traffic.obstacle import Obstacle, later
@@ -235,7 +235,7 @@ class Repairer:
                 lane=self.scene.lane, same_direction=self.scene.same_direction, road=self.scene.road,
             )  # fmt: skip
         if self._lanes is None:
-            self._lanes, _ = lanes_of(scene.scenario.lanelet_network)
+            self._lanes = lanes_at(scene)
         made = reframe(scene, positions, lanes=self._lanes)
         self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
         self._framed, self._kept = made, None

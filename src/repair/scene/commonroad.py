@@ -17,8 +17,9 @@ from repair.scene.frame import FrenetFrame
 from repair.scene.lead_in import drive_path
 from repair.scene.reading import read_file, require_commonroad
 from repair.scene.road.bounds import crossings, lateral_bounds
+from repair.scene.road.direction import driven_lanes
 from repair.scene.road.goal import goal_areas
-from repair.scene.road.lanes import Lane, lanes_of
+from repair.scene.road.lanes import Lane
 from repair.scene.road.passes import every_pass
 from repair.scene.road.route import Route, plan_route
 from repair.scene.scene import InitialState, Scene
@@ -233,11 +234,11 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
     n_steps = _steps_considered(scenario, problem, dt, first_step, settings.horizon, after)
     duration = n_steps * dt
 
-    lanes, notes = lanes_of(scenario.lanelet_network)
+    position = np.array([ego.x, ego.y])
+    lanes, notes = driven_lanes(scenario.lanelet_network, position, ego.orientation)
     speed = max(ego.velocity, 0.0)
     farthest = max(_ROUTE_MAX, (speed + _FASTER) * duration)  # as often around a ring as that takes
     ahead = float(np.clip(speed * duration + duration**2 + 40.0, 80.0, farthest))
-    position = np.array([ego.x, ego.y])
     route = plan_route(lanes, position, ego.orientation, problem.goal, speed=speed, ahead=ahead)
     lead_in = drive_path(
         route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing, near=route.start

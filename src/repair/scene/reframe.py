@@ -11,13 +11,14 @@ import numpy as np
 from repair.arrays import Array, frozen
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import crossings, lateral_bounds
-from repair.scene.road.lanes import Lane, lanes_of
+from repair.scene.road.direction import driven_lanes
+from repair.scene.road.lanes import Lane
 from repair.scene.road.passes import along
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["as_ego", "reframe"]
+__all__ = ["as_ego", "lanes_at", "reframe"]
 
 _SPACING = 0.5  # recorded points closer than this [m] are noise to a path
 _JOIN_TURN = 0.4  # a path that heads elsewhere by more than this [rad] goes straight on
@@ -74,7 +75,7 @@ def reframe(
     s0, l0 = frame.to_frenet(positions[:1], near=np.array([30.0]))[0]
     speed, acceleration = scene.start[1, 0], scene.start[2, 0]
     if lanes is None:
-        lanes, _ = lanes_of(scene.scenario.lanelet_network)
+        lanes = lanes_at(scene)
     found = crossings(frame, lanes)
     half = scene.vehicle.half_width
     return replace(
@@ -89,6 +90,13 @@ def reframe(
         speed_limit=None,
         notes=(*scene.notes, "the frame runs along the recorded reference"),
     )
+
+
+def lanes_at(scene: Scene) -> dict[int, Lane]:
+    """The map's lanes by id, as the scene's ego drives them."""
+    start = scene.initial_state
+    place = np.array([start.x, start.y])
+    return driven_lanes(scene.scenario.lanelet_network, place, start.orientation)[0]
 
 
 def _turn(direction: Array, heading: float) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
+from repair.scene.road.joints import Bridge
 
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
@@ -25,6 +26,8 @@ __all__ = ["RoadBoundary", "grouping"]
 _PREPARED = Lock()
 # The rectangle may come this close to the edge [m] only where the exact test says so.
 _TOUCH = 1e-6
+# What is closed and smaller than this [m²] is rounding.
+_SLIVER = 1e-5
 # Consecutive poses are put into one box over about this distance [m], and so many at most.
 _BOX = 4.0
 _MOST = 32
@@ -64,11 +67,37 @@ class RoadBoundary:
         self._scenario = scenario
         self._corners = vehicle.corners
         self.region = shapely.union_all(_outlines(scenario.lanelet_network))
+        self._drawn = self.region
         if gap > 0.0:
             self.region = _closed(self.region, gap)
         shapely.prepare(self.region)
         self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
+
+    def bridged(self, near: Any = None) -> list[Bridge]:
+        """The gaps and holes of the map that count as road.
+
+        Parameters
+        ----------
+        near : shapely geometry, optional
+            Only those that meet it.
+        """
+        import shapely
+
+        region, drawn = self.region, self._drawn
+        if region is drawn:
+            return []
+        if near is not None:
+            region, drawn = (shapely.intersection(part, near) for part in (region, drawn))
+        found = []
+        for part in shapely.get_parts(shapely.difference(region, drawn)):
+            area, half = float(shapely.area(part)), 0.5 * float(shapely.length(part))
+            if area <= _SLIVER:
+                continue
+            inside = shapely.point_on_surface(part)
+            width = 0.5 * (half - max(half**2 - 4.0 * area, 0.0) ** 0.5)  # of a rectangle, bent or not
+            found.append(Bridge("hole", width, (float(inside.x), float(inside.y))))
+        return found
 
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
         """Index of the first pose at which the ego touches or leaves the edge of the road, or None.

@@ -16,7 +16,7 @@ from repair.scene.road.lanes import Lane
 __all__ = ["LaneletCrossings", "LateralBounds", "crossings", "lateral_bounds"]
 
 _REACH = 20.0  # half length of the normals [m]
-_GAP = 0.2  # lanelets this close count as connected [m]
+_GAP = 0.36  # lanelets this close count as connected [m]; a little more than gaps are closed to
 _ALONG = 0.5  # cos of the largest angle between lanes of the same direction
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from repair.arrays import Array
+from repair.scene.road.joints import joined
 from repair.scene.road.lanes import Lane, locate
 
 __all__ = ["BEHIND", "centre_line", "cut_line", "direction_at"]
@@ -35,8 +36,9 @@ def direction_at(line: Array, end: int, sign: float) -> float:
     return 0.0
 
 
-def _append(line: list[Array], points: Array) -> None:
-    """Join polylines; points that would go backwards over a short overlap are left out."""
+def _forward(points: Array) -> Array:
+    """A polyline without points that repeat the one before or go back by a little."""
+    line: list[Array] = []
     for point in points:
         if line:
             step = point - line[-1]
@@ -45,6 +47,7 @@ def _append(line: list[Array], points: Array) -> None:
             if len(line) > 1 and np.hypot(*step) < 3.0 and np.dot(step, line[-1] - line[-2]) < 0.0:
                 continue
         line.append(point)
+    return np.array(line)
 
 
 def _changed(here: Array, there: Array, distance: float) -> Array:
@@ -73,16 +76,17 @@ def centre_line(chain: Sequence[int], lanes: Mapping[int, Lane], change: float) 
     change : float
         Length of a change by one lane [m].
     """
-    line: list[Array] = []
+    line: Array | None = None
     k = 0
     while k < len(chain):
         last = k
         while last + 1 < len(chain) and chain[last + 1] not in lanes[chain[last]].successors:
             last += 1
         here = lanes[chain[k]].center
-        _append(line, here if last == k else _changed(here, lanes[chain[last]].center, change * (last - k)))
+        here = here if last == k else _changed(here, lanes[chain[last]].center, change * (last - k))
+        line = here if line is None else joined(line, here, change)
         k = last + 1
-    return np.array(line)
+    return np.empty((0, 2)) if line is None else _forward(line)
 
 
 def cut_line(line: Array, position: Array, near: float, ahead: float) -> tuple[Array, float, bool]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from repair.arrays import Array, frozen, wrap
 from repair.errors import ScenarioError
 from repair.scene.road.centre_line import BEHIND, centre_line, cut_line, direction_at
 from repair.scene.road.goal import goal_groups, point_of
+from repair.scene.road.joints import joints_of
 from repair.scene.road.lanes import Lane, locate
 
 __all__ = ["Route", "plan_route"]
@@ -79,14 +81,21 @@ def _starts(lanes: Mapping[int, Lane], position: Array, heading: float) -> list[
             f"the ego starts at ({position[0]:.1f}, {position[1]:.1f}), {np.min(distance):.1f} m "
             f"from the nearest lanelet; at most {_NEAR:g} m are bridged"
         )
-    found = []
-    for i in np.flatnonzero(distance <= reach):
-        lane = lanes[ids[i]]
-        _, offset, direction = locate(lane.center, position)
-        error = float(np.abs(wrap(heading - direction)))
-        cost = error + 0.05 * abs(offset) + (0.0 if lane.drivable else 1.0)
-        found.append((error, cost, lane.id))
-    best = min(error for error, _, _ in found)
+    found: list[tuple[float, float, int]] = []
+    best = np.inf
+    for within in dict.fromkeys(
+        (reach, _NEAR)
+    ):  # who drives on an oncoming lane belongs on the one beside it
+        if best <= _HEADING_MAX:
+            break
+        found = []
+        for i in np.flatnonzero(distance <= within):
+            lane = lanes[ids[i]]
+            _, offset, direction = locate(lane.center, position)
+            error = float(np.abs(wrap(heading - direction)))
+            cost = error + 0.05 * abs(offset) + (0.0 if lane.drivable else 1.0)
+            found.append((error, cost, lane.id))
+        best = min(error for error, _, _ in found)
     if best > _HEADING_MAX:
         raise ScenarioError(
             f"the ego starts facing {np.rad2deg(best):.0f} degrees away from every lanelet it is on; "
@@ -260,7 +269,9 @@ def plan_route(
             break
         behind.insert(0, previous)
         room += lanes[previous].length
-    center = centre_line(behind + path[first:], lanes, float(np.clip(4.0 * speed, 20.0, 80.0)))
+    chain = [*behind, *path[first:]]
+    notes += map(str, joints_of((p for p in pairwise(chain) if p[1] in lanes[p[0]].successors), lanes))
+    center = centre_line(chain, lanes, float(np.clip(4.0 * speed, 20.0, 80.0)))
     center, start, cut = cut_line(center, position, room, ahead)
     road_ends = road_ends and not cut
     reached = tuple(i for i in path if i in targets)
