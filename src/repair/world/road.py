@@ -7,7 +7,7 @@ Without closed gaps the verdicts are at least as strict as those of the drivabil
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -84,19 +84,23 @@ class RoadBoundary:
         """
         import shapely
 
-        region, drawn = self.region, self._drawn
-        if region is drawn:
+        return [one for part, one in self._bridges if near is None or shapely.intersects(part, near)]
+
+    @cached_property
+    def _bridges(self) -> list[tuple[Any, Bridge]]:
+        """What counts as road and is drawn by nobody."""
+        import shapely
+
+        if self.region is self._drawn:
             return []
-        if near is not None:
-            region, drawn = (shapely.intersection(part, near) for part in (region, drawn))
         found = []
-        for part in shapely.get_parts(shapely.difference(region, drawn)):
+        for part in shapely.get_parts(shapely.difference(self.region, self._drawn)):
             area, half = float(shapely.area(part)), 0.5 * float(shapely.length(part))
             if area <= _SLIVER:
                 continue
             inside = shapely.point_on_surface(part)
             width = 0.5 * (half - max(half**2 - 4.0 * area, 0.0) ** 0.5)  # of a rectangle, bent or not
-            found.append(Bridge("hole", width, (float(inside.x), float(inside.y))))
+            found.append((part, Bridge("hole", width, (float(inside.x), float(inside.y)))))
         return found
 
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
@@ -224,12 +228,14 @@ class RoadBoundary:
 
 
 def _closed(region: Any, gap: float) -> Any:
-    """A region without gaps and holes up to a width, its outer edge where it was (morphological closing)."""
+    """A region with all that no disc as wide as the gap gets into from outside (morphological closing).
+
+    With mitred corners, which would leave inner corners as they are, GEOS 3.14 loses whole regions.
+    """
     import shapely
 
     half = 0.5 * gap + 1e-6
-    wide = shapely.buffer(region, half, join_style="mitre", mitre_limit=2.0)
-    return shapely.union(region, shapely.buffer(wide, -half, join_style="mitre", mitre_limit=2.0))
+    return shapely.union(region, shapely.buffer(shapely.buffer(region, half), -half))
 
 
 @lru_cache(maxsize=256)
