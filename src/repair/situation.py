@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from repair.arrays import in_seconds
+from repair.arrays import Array, in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
@@ -17,6 +17,7 @@ from repair.terminal.judge import EndJudge
 from repair.terminal.required import SafeEnds
 from repair.terminal.verdict import Terminal
 from repair.world.boxes import Occupancy
+from repair.world.dead_ends import dead_ends, with_boxes
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
@@ -68,7 +69,18 @@ class Situation:
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
         limits = self.limits.reserving(self.settings.reserve)
-        return ProblemFactory(self.scene, self.settings, limits, self.occupancy, self.reference, self.t_end)
+        occupancy = with_boxes(self.occupancy, self.dead_ends)
+        return ProblemFactory(self.scene, self.settings, limits, occupancy, self.reference, self.t_end)
+
+    @cached_property
+    def dead_ends(self) -> list[tuple[Array, Array]]:
+        """Where the path leaves the road within reach, as boxes in (s, l); see ``repair.road_ends``."""
+        road, scene, duration = self.checker.road, self.scene, self.t_end
+        if road is None or not self.settings.road_ends:
+            return []
+        s, v = float(scene.start[0, 0]), max(float(scene.start[1, 0]), 0.0)
+        ahead = v * duration + 0.5 * self.limits.a_max * duration**2
+        return dead_ends(road, scene.frame, scene.vehicle, scene.road, s, ahead)
 
     @cached_property
     def ends(self) -> EndJudge:

@@ -10,6 +10,7 @@ from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.problem import RepairProblem
 from repair.timegrid import INSTANT
 from repair.world.boxes import Occupancy
+from repair.world.dead_ends import ROAD_END
 from repair.world.occupancy import first_entry
 
 __all__ = ["boxes_entered"]
@@ -39,7 +40,8 @@ def boxes_entered(
     if entry is None:
         return []
     time = float(samples[entry[0]])
-    return [Violation(Reason.MARGIN, time, f"obstacle {problem.occupancy.ids[entry[1]]}")]
+    who = problem.occupancy.ids[entry[1]]
+    return [Violation(Reason.MARGIN, time, "end of the road" if who == ROAD_END else f"obstacle {who}")]
 
 
 def _enters(problem: RepairProblem, dense: FrenetTrajectory, n: int) -> bool:

@@ -223,6 +223,7 @@ class Checker:
             assert self.road is not None
             at = centre[index]
             words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
+            words += self.scene.ending_at(place)
             found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place))
         return found
 

@@ -78,5 +78,10 @@ class RepairConfig:
         "how far a repair may leave its path sideways",
         choices=("none", "lane", "same_direction", "road"),
     )
+    road_ends: bool = setting(
+        True,
+        "where the path leaves the road, at its end above all, repairs stop or go around as for an obstacle",
+        only_with=("checker.road", (True,)),
+    )
     degree: int = setting(3, "of the B-spline", low=3, high=5)
     spacing: float = setting(0.2, "knot spacing [s]", low=0.02, high=5.0)

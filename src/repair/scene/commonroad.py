@@ -245,8 +245,13 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
     )
     frame, s0 = lead_in.frame, lead_in.start
     notes += [*route.notes, *lead_in.notes]
-    if route.road_ends and frame.length - s0 < speed * duration:
-        notes.append(f"the road ends {frame.length - s0:.0f} m ahead, within the horizon")
+    goal_s = _goal_s(frame, s0, route, lanes, problem.goal)
+    if route.end is not None and frame.length - s0 < speed * duration:
+        goal = (
+            "" if goal_s is None else f"; the goal begins {max(frame.length - goal_s, 0.0):.0f} m before it"
+        )
+        ahead_m = f"{frame.length - s0:.0f} m ahead"
+        notes.append(f"the road ends {ahead_m}, within the horizon: {route.end}{goal}")
 
     obstacles, recorded, remarks = obstacles_of(
         scenario, first_step=first_step, n_steps=n_steps, after_prediction=after,
@@ -259,7 +264,7 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
         id=str(scenario.scenario_id), path=None, sha256="", dt=dt, frame=frame, model=model,
         start=frozen([[s0, 0.0], [ego.velocity, 0.0], [ego.acceleration, 0.0]]),
         initial_state=ego, planning_problem_id=int(problem.planning_problem_id), initial_time_step=first_step,
-        goal_s=_goal_s(frame, s0, route, lanes, problem.goal), route_end_s=frame.length,
+        goal_s=goal_s, route_end_s=frame.length, road_end=route.end,
         route_lanelets=route.lanelets, horizon=duration, n_steps=n_steps,
         obstacles=obstacles, recorded_ego=recorded,
         lane=lateral_bounds(found, half, lanelets=(*route.behind, *route.lanelets)),

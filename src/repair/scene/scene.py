@@ -13,6 +13,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
+from repair.scene.road.route import RoadEnd
 from repair.scene.settings import SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.prediction import Mode
@@ -21,6 +22,8 @@ from repair.vehicle.model import VehicleModel
 from repair.vehicle.parameters import Vehicle
 
 __all__ = ["InitialState", "Scene", "SpeedLimit"]
+
+_AT_THE_END = 6.0  # who leaves the road so near to its end leaves it there [m]
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,8 @@ class Scene:
         looked at by nobody, and what CommonRoad's own checker is to judge comes from :meth:`official`.
     settings : SceneConfig
         What the scene was loaded with.
+    road_end : RoadEnd or None
+        What kind of end the road has there; None where the route goes on beyond what is looked at.
     modes : tuple of Mode
         Of obstacles that were given several predictions (:func:`repair.with_traffic`).
     first_heading : float or None
@@ -126,8 +131,16 @@ class Scene:
     scenario: Any
     planning_problem: Any
     settings: SceneConfig = field(default_factory=SceneConfig)
+    road_end: RoadEnd | None = None
     modes: tuple[Mode, ...] = ()
     first_heading: float | None = None
+
+    def ending_at(self, place: tuple[float, float]) -> str:
+        """What the road's end is, as it goes on a sentence about a place [m]; empty elsewhere."""
+        end = self.road_end
+        if end is None or np.hypot(place[0] - end.place[0], place[1] - end.place[1]) > _AT_THE_END:
+            return ""
+        return f"; {end}"
 
     def __repr__(self) -> str:
         return (

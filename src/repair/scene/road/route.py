@@ -16,12 +16,38 @@ from repair.scene.road.goal import goal_groups, point_of
 from repair.scene.road.joints import joints_of
 from repair.scene.road.lanes import Lane, locate
 
-__all__ = ["Route", "plan_route"]
+__all__ = ["RoadEnd", "Route", "plan_route"]
 
 _NEAR = 5.0  # a start this far [m] outside of every lanelet is still taken
 _HEADING_MAX = np.deg2rad(100.0)
 _HEADING_SPREAD = np.deg2rad(45.0)  # worse matches are considered only where no better one is
+# The map goes on beyond the end of a lanelet if anything lies in a strip ahead of it [m].
+_BEYOND_FROM, _BEYOND, _BEYOND_ASIDE = 1.0, 60.0, 10.0
 _CHANGE_COST = 50.0  # a lane change weighs as much as this much road [m]
+
+
+@dataclass(frozen=True)
+class RoadEnd:
+    """Where a route cannot go on because its last lanelet has no successor.
+
+    Attributes
+    ----------
+    place : (float, float)
+        [m]
+    lanelet : int
+        The last one.
+    of_map : bool
+        No lanelet lies beyond: the map ends there, and whether the road does is not known.
+    """
+
+    place: tuple[float, float]
+    lanelet: int
+    of_map: bool
+
+    def __str__(self) -> str:
+        if self.of_map:
+            return "the map ends there, and what lies beyond is not known"
+        return f"lanelet {self.lanelet} ends there within the map"
 
 
 @dataclass(frozen=True)
@@ -41,7 +67,7 @@ class Route:
         Where the ego is along it [m].
     goal_lanelets : tuple of int
         Those of ``lanelets`` that belong to the goal.
-    road_ends : bool
+    end : RoadEnd or None
         The centre line stops because the road does.
     notes : tuple of str
     """
@@ -51,7 +77,7 @@ class Route:
     center: Array
     start: float
     goal_lanelets: tuple[int, ...]
-    road_ends: bool
+    end: RoadEnd | None
     notes: tuple[str, ...]
 
 
@@ -194,6 +220,21 @@ def _straight_start(
     return min(near, key=turn)
 
 
+def _end(lanes: Mapping[int, Lane], last: int) -> RoadEnd:
+    """What kind of end a route has: whether any lanelet lies beyond it."""
+    import shapely
+
+    line = lanes[last].center
+    direction = direction_at(line, -1, 1.0)
+    ahead = np.array([np.cos(direction), np.sin(direction)])
+    aside = _BEYOND_ASIDE * np.array([-ahead[1], ahead[0]])
+    near, far = line[-1] + _BEYOND_FROM * ahead, line[-1] + _BEYOND * ahead
+    strip = shapely.Polygon([near - aside, far - aside, far + aside, near + aside])
+    others = [lane.polygon for name, lane in lanes.items() if name != last and lane.drivable]
+    met = bool(others) and bool(shapely.intersects(np.array(others), strip).any())
+    return RoadEnd((float(line[-1][0]), float(line[-1][1])), last, not met)
+
+
 def plan_route(
     lanes: Mapping[int, Lane],
     position: Array,
@@ -273,6 +314,6 @@ def plan_route(
     notes += map(str, joints_of((p for p in pairwise(chain) if p[1] in lanes[p[0]].successors), lanes))
     center = centre_line(chain, lanes, float(np.clip(4.0 * speed, 20.0, 80.0)))
     center, start, cut = cut_line(center, position, room, ahead)
-    road_ends = road_ends and not cut
+    end = _end(lanes, path[-1]) if road_ends and not cut else None
     reached = tuple(i for i in path if i in targets)
-    return Route(tuple(path), tuple(behind), frozen(center), start, reached, road_ends, tuple(notes))
+    return Route(tuple(path), tuple(behind), frozen(center), start, reached, end, tuple(notes))

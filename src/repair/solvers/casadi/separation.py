@@ -25,10 +25,11 @@ from repair.arrays import Array
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 from repair.scene.road.bounds import LateralBounds
 from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
+from repair.world.dead_ends import ROAD_END
 
 __all__ = ["NOBODY", "ROAD", "SIDE_OF_BOUND", "Separation", "road_room", "separate"]
 
-NOBODY, ROAD = -1, -2
+NOBODY, ROAD = -1, ROAD_END
 #: On which sides of an obstacle the lower and the upper bound of s are, and those of l.
 SIDE_OF_BOUND = ((Side.AHEAD, Side.BEHIND), (Side.LEFT, Side.RIGHT))
 _SIDES = np.arange(len(Side))

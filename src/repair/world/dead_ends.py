@@ -1,0 +1,117 @@
+"""Where the path leaves the road, as boxes in (s, l, t): the end of a lane is something to stop before.
+
+To a backend the end of the drivable route is a standing obstacle like any other: it yields to it, or passes
+it on a side where the road goes on. Where that is, is asked of the road itself, so that lanes that end or
+narrow, closed lanes and the end of the map are the same thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from repair.arrays import Array, frozen, names
+from repair.world.boxes import Occupancy
+
+if TYPE_CHECKING:
+    from repair.scene.frame import FrenetFrame
+    from repair.scene.road.bounds import LateralBounds
+    from repair.vehicle.parameters import Vehicle
+    from repair.world.road import RoadBoundary
+
+__all__ = ["ROAD_END", "dead_ends", "with_boxes"]
+
+#: Instead of an obstacle's id.
+ROAD_END = -2
+
+_COARSE, _FINE = 0.5, 0.02  # steps along the path [m]
+_SIDEWAYS = 0.2  # steps across it [m]
+_SPARE = 0.1  # kept to the last place that is on the road [m]
+_BEFORE = 6.0  # the last place that is on the road is looked for so far before the first that is not [m]
+_OVER = 0.05  # who is over the edge by less is not stopped: how the body is turned there is not known yet [m]
+_FAR = 1e4  # where the road never goes on [m]
+_SEEN = 60.0  # how much of a part off the road is looked at sideways [m]
+
+_Inside = Callable[..., npt.NDArray[np.bool_]]
+
+
+def dead_ends(
+    road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle, room: LateralBounds, start: float, ahead: float
+) -> list[tuple[Array, Array]]:
+    """The parts of the path on which the ego would be off the road.
+
+    Parameters
+    ----------
+    road : RoadBoundary
+    frame : FrenetFrame
+        Along the path.
+    vehicle : Vehicle
+        The ego.
+    room : LateralBounds
+        How far aside the ego may go.
+    start, ahead : float
+        From where on the path is looked at, and how far [m]. A part in which it starts is none.
+
+    Returns
+    -------
+    list of (lower, upper)
+        Corners ``[s, l]`` (2,) of a box for the ego's reference point each; from the last place at which the
+        ego, along the path, is on the road, and as wide as the road is missing around the path.
+    """
+
+    def inside(s: Array, l: Array, over: float = 0.0) -> npt.NDArray[np.bool_]:  # noqa: E741
+        body = vehicle.corners - over * np.sign(vehicle.corners)
+        slip = np.arcsin(np.clip(vehicle.rear * frame.curvature(s), -0.9, 0.9))
+        turn = np.exp(1j * (frame.heading(s) - slip))
+        centre = np.ascontiguousarray(frame.to_cartesian(s, l)).view(np.complex128)
+        corners = centre + turn[:, None] * (body[:, 0] + 1j * body[:, 1])
+        return road.inside(np.stack([corners.real, corners.imag], axis=2))
+
+    s = start + np.arange(0.0, ahead + _COARSE, _COARSE)
+    on = inside(s, np.zeros(len(s)), _OVER)
+    if on.all():
+        return []
+    change = np.flatnonzero(np.diff(on.astype(np.int8)))
+    found = []
+    for k in change[on[change]]:
+        again = np.flatnonzero(on[k + 1 :])
+        last = k + 1 + int(again[0]) if len(again) else len(s) - 1
+        fine = np.arange(max(s[k] - _BEFORE, start), s[k + 1], _FINE)
+        whole = np.flatnonzero(inside(fine, np.zeros(len(fine))))
+        wall = float(fine[whole[-1]]) if len(whole) else float(s[k])
+        left = _open_side(inside, wall, float(s[last]), room, 1.0)
+        right = _open_side(inside, wall, float(s[last]), room, -1.0)
+        beyond = float(s[last]) + _SPARE if len(again) else _FAR
+        found.append((np.array([wall - _SPARE, right]), np.array([beyond, left])))
+    return found
+
+
+def _open_side(inside: _Inside, first: float, last: float, room: LateralBounds, sign: float) -> float:
+    """The offset from which on the ego is on the road all along a part of the path; far out if none is."""
+    s = np.arange(first + _COARSE, min(last, first + _SEEN) + _COARSE, 1.0)
+    bounds = np.abs(room.at(s)[0 if sign < 0.0 else 1])
+    aside = np.arange(_SIDEWAYS, float(bounds.max(initial=0.0)) + _SIDEWAYS, _SIDEWAYS)
+    if not len(aside):
+        return sign * _FAR
+    places = np.meshgrid(s, sign * aside, indexing="ij")
+    free = inside(*(column.ravel() for column in places)).reshape(len(s), -1).all(axis=0)
+    return sign * (float(aside[np.argmax(free)]) if free.any() else _FAR)
+
+
+def with_boxes(occupancy: Occupancy, boxes: list[tuple[Array, Array]]) -> Occupancy:
+    """The obstacles and standing boxes beside them, with the id :data:`ROAD_END`."""
+    if not boxes:
+        return occupancy
+    steps = len(occupancy.t)
+    lower, upper = (np.array([pair[k] for pair in boxes]) for k in (0, 1))
+    more = [np.repeat(corners[:, None], steps, axis=1) for corners in (lower, upper)]
+    return Occupancy(
+        occupancy.t,
+        names([*occupancy.ids.tolist(), *[ROAD_END] * len(boxes)]),
+        frozen(np.concatenate([occupancy.lower, more[0]])),
+        frozen(np.concatenate([occupancy.upper, more[1]])),
+        np.append(occupancy.static, np.ones(len(boxes), dtype=np.bool_)),
+    )
