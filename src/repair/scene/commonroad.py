@@ -247,11 +247,10 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
     notes += [*route.notes, *lead_in.notes]
     goal_s = _goal_s(frame, s0, route, lanes, problem.goal)
     if route.end is not None and frame.length - s0 < speed * duration:
-        goal = (
-            "" if goal_s is None else f"; the goal begins {max(frame.length - goal_s, 0.0):.0f} m before it"
-        )
-        ahead_m = f"{frame.length - s0:.0f} m ahead"
-        notes.append(f"the road ends {ahead_m}, within the horizon: {route.end}{goal}")
+        note = f"the road ends {frame.length - s0:.0f} m ahead, within the horizon: {route.end}"
+        if goal_s is not None:
+            note += f"; the goal begins {max(frame.length - goal_s, 0.0):.0f} m before it"
+        notes.append(note)
 
     obstacles, recorded, remarks = obstacles_of(
         scenario, first_step=first_step, n_steps=n_steps, after_prediction=after,
