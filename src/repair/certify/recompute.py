@@ -29,7 +29,6 @@ from repair.certify.solution import (
     agreement_rows,
     columns_row,
     form_rows,
-    goal_row,
     official_rows,
     only_states,
     start_rows,
@@ -121,7 +120,6 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows += late_rows(folder, content, prepared, traffic, _reference(content, prepared))
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)
     rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap)
-    rows.append(goal_row(part, problem))
     return Certificate(
         folder,
         str(content.get("scenario")),

@@ -21,7 +21,6 @@ __all__ = [
     "agreement_rows",
     "columns_row",
     "form_rows",
-    "goal_row",
     "official_rows",
     "only_states",
     "start_rows",
@@ -118,17 +117,6 @@ def _middle(value: Any) -> float:
     return float((value.start + value.end) / 2.0 if hasattr(value, "start") else value)
 
 
-def goal_row(part: Any, problem: Any) -> CertificateRow:
-    """CommonRoad's own ``goal_reached`` on the states of the file; a repair need not reach it."""
-    try:
-        reached = bool(problem.goal_reached(part.trajectory)[0])
-    except Exception:  # goals that commonroad-io cannot judge
-        reached = False
-    return CertificateRow(
-        "goal reached", float(reached), 1.0, float(reached) - 1.0, True, "official", "", claim=False
-    )
-
-
 def agreement_rows(
     states: States, motion: Motion, vehicle: Vehicle, dt: float, first: int
 ) -> list[CertificateRow]:
@@ -177,9 +165,9 @@ def _most(values: Array) -> float:
 
 
 def official_rows(
-    file: Path, scenario: Any, problem: Any, *, on_road: bool, gap: float
+    file: Path, scenario: Any, problem: Any, *, on_road: bool, gap: float, goal: bool = False
 ) -> list[CertificateRow]:
-    """The three answers of the drivability checker.
+    """The answers of the drivability checker, a row for each; a repair need not reach the goal.
 
     Parameters
     ----------
@@ -189,12 +177,18 @@ def official_rows(
         What was found here.
     gap : float
         Gaps of the map that were closed for that [m].
+    goal : bool
+        Whether the result claims to reach the goal.
     """
     from commonroad.planning.planning_problem import PlanningProblemSet
 
     problems = PlanningProblemSet([problem])
     verdict: OfficialVerdict = check_solution_file(file, scenario, problems)
     rows = [
+        said("solved_all_problems", verdict.solved, "official"),
+        said("vehicle model known", verdict.vehicle_model, "official"),
+        said("states connected", verdict.connected, "official"),
+        said("starts_at_correct_state", verdict.starts, "official"),
         said("solution_feasible", verdict.feasible, "official"),
         said("obstacle_collision", verdict.collision_free, "official"),
     ]
@@ -204,4 +198,6 @@ def official_rows(
         rows.append(said(name, False, "official", remark, claim=False))
     else:
         rows.append(said(name, verdict.on_road, "official"))
+    rows.append(said("ego_collision", verdict.egos_apart, "official"))
+    rows.append(said("goal_reached", verdict.goal, "official", claim=goal))
     return rows

@@ -102,5 +102,5 @@ def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[fl
     problems = prepared.source.at(t_rep)
     if not problems:
         return None
-    verdict: Verdict = prepared.checker.check(problems[0], curve)
+    verdict: Verdict = prepared.judge.check(problems[0], curve)
     return (t_rep, curve) if verdict.ok else None

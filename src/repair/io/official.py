@@ -7,18 +7,25 @@ sweeps and certificates do.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from repair.io.plotting import import_matplotlib
 
 __all__ = ["OfficialVerdict", "check_solution_file"]
 
+# What the middle of a vehicle moves beyond what its rear axle does, turning at steering limits [m].
+_APART = 0.1
+
 
 @dataclass(frozen=True)
 class OfficialVerdict:
-    """The drivability checker's three answers, and by which road boundary it judged.
+    """What CommonRoad asks of a solution: the parts of ``valid_solution``, each by itself.
 
     Attributes
     ----------
@@ -31,17 +38,44 @@ class OfficialVerdict:
     road_method : str
         ``triangulation`` (``boundary_collision`` itself, which needs the package ``triangle``), else
         the method of ``create_road_boundary_obstacle`` that was used instead.
+    solved : bool
+        ``solved_all_problems``: it is for the planning problem that was asked about.
+    vehicle_model : bool
+        The checker knows the vehicle and the model, and the states are that model's.
+    connected : bool
+        Each state is one time step after the one before, and no farther than its speed takes it.
+    starts : bool
+        ``starts_at_correct_state``.
+    goal : bool
+        ``goal_reached``: some state fulfils a goal state.
+    egos_apart : bool
+        ``ego_collision`` raised nothing.
     """
 
     feasible: bool
     collision_free: bool
     on_road: bool
     road_method: str
+    solved: bool = True
+    vehicle_model: bool = True
+    connected: bool = True
+    starts: bool = True
+    goal: bool = True
+    egos_apart: bool = True
 
     @property
     def ok(self) -> bool:
-        """All three."""
-        return self.feasible and self.collision_free and self.on_road
+        """Nothing is wrong with it, but that it need not reach the goal."""
+        return self.feasible and self.collision_free and self.on_road and self._whole
+
+    @property
+    def valid(self) -> bool:
+        """All that ``valid_solution`` asks for, the goal included."""
+        return self.ok and self.goal
+
+    @property
+    def _whole(self) -> bool:
+        return self.solved and self.vehicle_model and self.connected and self.starts and self.egos_apart
 
 
 def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> OfficialVerdict:
@@ -63,20 +97,57 @@ def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> Of
 
     solution = read_solution(file)
     import_matplotlib()  # the drivability checker does, with whatever MPLBACKEND says
-    from commonroad_dc.feasibility import solution_checker
+    from commonroad_dc.feasibility import solution_checker as official
+    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+
+    everything = scenario, planning_problems, solution
+    parts = solution.planning_problem_solutions
+
+    def feasible() -> bool:
+        answers = official.solution_feasible(solution, scenario.dt, planning_problems)
+        return all(bool(answer[0]) for answer in answers.values())
+
+    def known() -> bool:
+        for part in parts:
+            VehicleDynamics.from_model(part.vehicle_model, part.vehicle_type)
+        return all(part.trajectory_type.name == part.vehicle_model.name for part in parts)
 
     try:
-        answers = solution_checker.solution_feasible(solution, scenario.dt, planning_problems)
-        feasible = all(bool(answer[0]) for answer in answers.values())
-    except Exception:  # the checker raises where it cannot reconstruct inputs: that is a no
-        feasible = False
-    try:
-        solution_checker.obstacle_collision(scenario, planning_problems, solution)
+        official.obstacle_collision(*everything)
         collision_free = True
-    except solution_checker.CollisionException:
+    except official.CollisionException:
         collision_free = False
     on_road, method = _on_road(solution, scenario, planning_problems)
-    return OfficialVerdict(feasible, collision_free, on_road, method)
+    return OfficialVerdict(
+        _said(feasible), collision_free, on_road, method,
+        solved=_said(lambda: official.solved_all_problems(planning_problems, solution)),
+        vehicle_model=_said(known),
+        connected=all(_said(partial(_connected, part.trajectory.state_list, scenario.dt)) for part in parts),
+        starts=_said(lambda: official.starts_at_correct_state(solution, planning_problems)),
+        goal=_said(lambda: official.goal_reached(*everything)),
+        egos_apart=_said(lambda: not official.ego_collision(*everything)),
+    )  # fmt: skip
+
+
+def _said(question: Callable[[], Any]) -> bool:
+    """What the checker answers; where it raises, to say no or because it cannot judge, that is a no."""
+    try:
+        return bool(question())
+    except Exception:
+        return False
+
+
+def _connected(states: Any, dt: float) -> bool:
+    """Each state a time step after the one before, and no farther than the faster of both speeds takes it."""
+    steps = np.array([state.time_step for state in states])
+    place = np.array([np.asarray(state.position)[:2] for state in states], dtype=np.float64)
+    speed = np.abs([float(state.velocity) for state in states])
+    way = np.hypot(*np.diff(place, axis=0).T)
+    return bool(
+        (np.diff(steps) == 1).all()
+        and np.isfinite(place).all()
+        and (way <= 1.3 * dt * np.maximum(speed[1:], speed[:-1]) + _APART).all()
+    )
 
 
 def _on_road(solution: Any, scenario: Any, planning_problems: Any) -> tuple[bool, str]:

@@ -29,6 +29,7 @@ def sweep_report(rows: Sequence[Row], command: str) -> str:
         f"Made by `{command}`; search times are those of one run on one machine.",
         "## How many\n\n" + _summary(rows, backends, references),
         "## What CommonRoad's own checker says\n\n" + _official(rows),
+        "## How repairs end\n\n" + _endings(rows, backends, references),
         "## Backends compared\n\n" + _compared(rows, backends),
         "## F-TTR above the TTR\n\n" + _above(rows),
         "## Repaired although braking does not help\n\n" + _beyond_braking(rows),
@@ -82,10 +83,26 @@ def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[
     return _table(head, body)
 
 
+_ASKED = {
+    "official_solved": "the planning problem is solved (`solved_all_problems`)",
+    "official_vehicle_model": "vehicle and model are known, the states are the model's",
+    "official_connected": "each state follows the one before",
+    "official_start": "start state (`starts_at_correct_state`)",
+    "official_feasible": "feasibility (`solution_feasible`)",
+    "official_collision_free": "no collision with obstacles (`obstacle_collision`)",
+    "official_on_road": "no collision with the road's boundary (`boundary_collision`)",
+    "official_egos_apart": "no collision among egos (`ego_collision`)",
+    "official_goal": "goal (`goal_reached`)",
+    "official_valid": "all of it",
+}
+
+
 def _official(rows: Sequence[Row]) -> str:
     judged = [r for r in rows if r["official_feasible"] is not None]
     keys = ("official_feasible", "official_collision_free", "official_on_road")
-    rejected = [r for r in judged if not all(r[k] for k in keys)]
+    others = ("official_solved", "official_vehicle_model", "official_connected", "official_start",
+              "official_egos_apart")  # fmt: skip
+    rejected = [r for r in judged if not all(r[k] for k in keys) or any(r.get(k) is False for k in others)]
     methods = ", ".join(f"{k}: {n}" for k, n in Counter(r["road_method"] for r in judged).items())
     text = (
         f"{len(judged)} trajectories (repaired, or the reference where there is no conflict) were written as "
@@ -102,10 +119,37 @@ def _official(rows: Sequence[Row]) -> str:
         if broken:
             body = [[r[k] for k in ("file", "backend", "reference", "certificate")] for r in broken]
             text += "\n\n" + _table(("file", "backend", "reference", "violated"), body)
+    if any(r.get("official_valid") is not None for r in judged):
+        table = [(words, sum(bool(r.get(key)) for r in judged), len(judged)) for key, words in _ASKED.items()]
+        text += "\n\n" + _table(("what `valid_solution` asks for", "holds for", "of"), table)
     if rejected:
         body = [[r[k] for k in ("file", "backend", "reference", "status", *keys)] for r in rejected]
         head = ("file", "backend", "reference", "status", "feasible", "no collision", "road")
         text += "\n\n" + _table(head, body)
+    return text
+
+
+def _endings(rows: Sequence[Row], backends: Sequence[str], references: Sequence[str]) -> str:
+    """How many repairs end safe, safe unless extended, and unsafe; the unsafe ones by name."""
+    asked = [r for r in rows if r.get("ending")]
+    if not asked:
+        return "Nobody asked (`checker.terminal`)."
+    kinds = ("safe", "safe_unless_extended", "unsafe")
+    body = []
+    for reference in references:
+        for backend in backends:
+            own = Counter(
+                r["ending"] for r in asked if r["backend"] == backend and r["reference"] == reference
+            )
+            body.append((reference, backend, sum(own.values()), *(own[kind] for kind in kinds)))
+    body.append(("all", "", len(asked), *(sum(r["ending"] == kind for r in asked) for kind in kinds)))
+    head = ("reference", "backend", "repaired", "safe", "safe unless extended", "unsafe")
+    text = _table(head, body)
+    unsafe = [r for r in asked if r["ending"] == "unsafe"]
+    if unsafe:
+        keys = ("file", "reference", "backend", "f_ttr_s", "ending_detail")
+        names = ("file", "reference", "backend", "F-TTR [s]", "what full braking fails on")
+        text += "\n\n" + _table(names, [[r[k] for k in keys] for r in unsafe])
     return text
 
 

@@ -13,7 +13,10 @@ COLUMNS = (
     "from_behind", "ttc_s", "contact_ttc_s", "checked_until_s", "decided_by", "f_ttr_s", "ttb_s", "ttr_s",
     "maneuver",
     "peak_deceleration_mps2", "peak_acceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps",
+    "ending", "ending_maneuver", "ending_detail",
     "largest_residual", "probes", "official_feasible", "official_collision_free", "official_on_road",
+    "official_solved", "official_vehicle_model", "official_connected", "official_start", "official_goal",
+    "official_egos_apart", "official_valid",
     "road_method", "certificate", "load_time_s", "prepare_time_s", "search_time_s", "solve_time_s",
     "check_time_s", "official_time_s",
 )  # fmt: skip

@@ -80,6 +80,7 @@ def _row(
         prepare_time_s=round(prepared_in, 4),
         **{f"{name}_time_s": round(result.phases[name], 5) for name in ("search", "solve", "check")},
     )
+    row.update(_ending(content["terminal"]))
     if settings.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row.update(_official(result))
     if settings.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
@@ -96,6 +97,23 @@ def _why(probe: Any) -> str:
     tried = "; ".join(probe.tried)
     details = "; ".join(f"{v.reason.value} at {v.time:.2f} s: {v.detail}" for v in probe.verdict.violations)
     return f"{tried} | {details}" if tried else details
+
+
+def _ending(terminal: dict[str, Any] | None) -> dict[str, Any]:
+    """How a repair ends, and what breaks it."""
+    if terminal is None:
+        return {}
+    met = [(how, one) for how, one in terminal["extended"].items() if one is not None]
+    met += [("", one) for one in terminal["details"]]
+    words = (
+        f"{how + ': ' if how else ''}{one['reason']} at {one['t_s']:.2f} s: {one['detail']}"
+        for how, one in met
+    )
+    return {
+        "ending": terminal["ending"],
+        "ending_maneuver": terminal["maneuver"],
+        "ending_detail": "; ".join(words),
+    }
 
 
 def _certificate(result: Any) -> str:
@@ -126,6 +144,13 @@ def _official(result: Any) -> dict[str, Any]:
         "official_feasible": verdict.feasible,
         "official_collision_free": verdict.collision_free,
         "official_on_road": verdict.on_road,
+        "official_solved": verdict.solved,
+        "official_vehicle_model": verdict.vehicle_model,
+        "official_connected": verdict.connected,
+        "official_start": verdict.starts,
+        "official_goal": verdict.goal,
+        "official_egos_apart": verdict.egos_apart,
+        "official_valid": verdict.valid,
         "road_method": verdict.road_method,
         "official_time_s": round(time.perf_counter() - begin, 4),
     }
