@@ -21,6 +21,8 @@ from repair.errors import ConfigError, ReferenceTrajectoryError
 from repair.reference.blind import limit_at
 from repair.reference.profile import SpeedProfile
 from repair.reference.settings import ReferenceConfig
+from repair.timegrid import intervals
+from repair.vehicle.transitions import POSITION_TOLERANCE
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
@@ -67,8 +69,11 @@ def _lattice(v0: float, v_max: float, config: ReferenceConfig, n_layers: int) ->
     return _Lattice(dv, config.time_step, first, n_speeds, 2 * (n_speeds - 1) * n_layers + 1, changes)
 
 
-def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline:
+def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> UniformBSpline | SpeedProfile:
     """Search the (s, v, t) graph for the most comfortable way along the path; smooth it to C2.
+
+    Where the scenario's steps are so long that a vehicle with one input for each of them could not follow
+    the smooth curve, it is driven with constant acceleration from step to step.
 
     Raises
     ------
@@ -99,7 +104,7 @@ def plan_speed(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> U
         )
     a = np.diff(speeds) / config.time_step
     profile = SpeedProfile.from_accelerations(s0, float(speeds[0]), [config.time_step] * n_layers, a.tolist())
-    return _smooth(profile, scene, n_layers * config.time_step)
+    return _by_steps(_smooth(profile, scene, n_layers * config.time_step), scene)
 
 
 def _node_cost(
@@ -197,3 +202,18 @@ def _smooth(profile: SpeedProfile, scene: Scene, duration: float) -> UniformBSpl
     points = np.zeros((n, 2))
     points[:, 0] = np.concatenate([head[:, 0], tail])
     return UniformBSpline(0.0, spacing, degree, frozen(points))
+
+
+def _by_steps(curve: UniformBSpline, scene: Scene) -> UniformBSpline | SpeedProfile:
+    """The curve, or constant accelerations between its speeds at the steps where those cannot follow it.
+
+    A jerk j moves the end of a step by j dt³ / 12 from where its mean acceleration leads.
+    """
+    jerk = float(np.abs(curve.derivative_points(3)[:, 0]).max())
+    if jerk * scene.dt**3 / 12.0 <= 0.5 * POSITION_TOLERANCE:
+        return curve
+    count = max(intervals(curve.t_end, scene.dt), 1)
+    speeds = np.maximum(curve.sample(np.arange(count + 1) * scene.dt).velocity[:, 0], 0.0)
+    rates = np.diff(speeds) / scene.dt
+    s0 = float(scene.start[0, 0])
+    return SpeedProfile.from_accelerations(s0, float(speeds[0]), [scene.dt] * count, rates.tolist())

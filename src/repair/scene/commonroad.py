@@ -241,7 +241,7 @@ def _build(scenario: Any, problem: Any, settings: SceneConfig) -> Scene:
     ahead = float(np.clip(speed * duration + duration**2 + 40.0, 80.0, farthest))
     route = plan_route(lanes, position, ego.orientation, problem.goal, speed=speed, ahead=ahead)
     lead_in = drive_path(
-        route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing, near=route.start
+        route.center, position, ego.orientation, speed, vehicle, smoothing=smoothing, near=route.start, dt=dt
     )
     frame, s0 = lead_in.frame, lead_in.start
     notes += [*route.notes, *lead_in.notes]

@@ -10,6 +10,7 @@ import numpy as np
 from repair.arrays import Array, wrap
 from repair.errors import ScenarioError
 from repair.scene.frame import FrenetFrame
+from repair.vehicle.by_steps import missed_by_steps
 from repair.vehicle.parameters import Vehicle
 
 __all__ = ["LeadIn", "drive_path"]
@@ -19,6 +20,8 @@ _COMFORT = 1.5  # lateral acceleration that the lead-in may add at the initial s
 _GRIP = 0.88  # of the friction circle that the lead-in may use: a little less than what limits leave
 _BESIDE = 0.75  # how far beside the route it may run for a while [m]
 _SHARP = 0.25  # curvature of a centre line above which its kinks are smoothed harder [1/m]
+_SHORT = 0.25  # steps that are not longer follow every lead-in that is comfortable [s]
+_PARTS, _STEPS = 16, 60  # of a longer step, and steps, that are looked at
 _STEEP = 0.6  # heading error above which the ego first turns towards the route [rad]
 
 
@@ -116,8 +119,22 @@ class _Blend:
         pull = np.max(bend) * speed**2 / grip if np.max(usual) * speed**2 <= grip else 0.0
         return np.array([np.max(bend) / limit, np.max(bend - usual) * speed**2 / _COMFORT, pull])
 
+    def missed(self, frame: FrenetFrame, s0: float, speed: float, dt: float, vehicle: Vehicle) -> float:
+        """What steering by long steps misses, at constant speed and speeding up; above 1 it is too much."""
+        worst, length = 0.0, max(self.length, self.rest if self.kept else 0.0)
+        for rate in (0.0, 1.0):
+            if dt <= _SHORT or speed + rate <= 0.0:
+                continue
+            until = length / speed if not rate else float(np.sqrt(speed**2 + 2.0 * length)) - speed
+            steps = np.arange(min(int(np.ceil(until / dt)), _STEPS))[:, None]
+            t = (steps + np.linspace(0.0, 1.0, _PARTS + 1)) * dt
+            x = speed * t + 0.5 * rate * t**2
+            kappa = _offset_curvature(frame, (s0 + x).ravel(), self(x.ravel())).reshape(x.shape)
+            worst = max(worst, missed_by_steps(kappa, speed + rate * t, dt, vehicle))
+        return worst
 
-def _blend(frame: FrenetFrame, s0: float, start: Array, speed: float, vehicle: Vehicle) -> _Blend:
+
+def _blend(frame: FrenetFrame, s0: float, start: Array, speed: float, vehicle: Vehicle, dt: float) -> _Blend:
     """Shortest blend whose curvature is drivable and adds a comfortable lateral acceleration."""
     limit, grip = 0.8 * vehicle.largest_curvature(), _GRIP * vehicle.a_max
     least = max(8.0, 1.5 * speed)
@@ -133,12 +150,31 @@ def _blend(frame: FrenetFrame, s0: float, start: Array, speed: float, vehicle: V
         if excess <= 1.0:
             break
     if pull <= 1.0:
-        return best
+        return _by_steps(best, options, worst, frame, s0, speed, vehicle, dt)
     for length, rest in itertools.product(least * np.array([0.5, 0.7, 1.0]), options[options > 2.0 * least]):
         tried = _Blend(start, float(length), start[0] + 0.5 * start[1] * float(length), float(rest))
         if abs(tried.kept) <= _BESIDE and np.max(tried.excess(frame, s0, speed, limit, grip)) <= 1.0:
             return tried
     return best
+
+
+def _by_steps(
+    usual: _Blend, options: Array, worst: float, frame: FrenetFrame, s0: float, speed: float,
+    vehicle: Vehicle, dt: float,
+) -> _Blend:  # fmt: skip
+    """The shortest blend that long steps can follow; the usual one where that runs far beside the route."""
+    if dt <= _SHORT:
+        return usual
+    limit, grip = 0.8 * vehicle.largest_curvature(), _GRIP * vehicle.a_max
+    for length in options[options >= usual.length]:
+        tried = _Blend(usual.start, float(length))
+        beside = float(np.abs(tried(np.linspace(0.0, length, 64))[0]).max())
+        found = tried.excess(frame, s0, speed, limit, grip)
+        if beside > abs(usual.start[0]) + _BESIDE or max(found[0], found[1]) > max(worst, 1.0):
+            continue
+        if tried.missed(frame, s0, speed, dt, vehicle) <= 1.0:
+            return tried
+    return usual
 
 
 def _turn_in(frame: FrenetFrame, pose: Array, limit: float, near: float) -> tuple[Array, float]:
@@ -178,6 +214,7 @@ def drive_path(
     *,
     smoothing: float = 0.15,
     near: float | None = None,
+    dt: float = 0.0,
 ) -> LeadIn:
     """Lay the frame along the path from the ego's pose onto the centre line.
 
@@ -198,6 +235,8 @@ def drive_path(
         How far smoothing may move the centre line [m]; more only to take out kinks (noted).
     near : float, optional
         About where the ego is along the centre line [m], which may pass it more than once.
+    dt : float
+        Time step, over which the vehicle has one steering rate [s].
 
     Raises
     ------
@@ -228,7 +267,7 @@ def drive_path(
     else:
         s1, l1 = s0, l0
     start = _start_offsets(frame, s1, l1, error, curvature)
-    blend = _blend(frame, s1, start, speed, vehicle)
+    blend = _blend(frame, s1, start, max(speed, 0.0), vehicle, dt)
     end = max(frame.length, s1 + 1.0)
     grid = s1 + np.arange(0.0, end - s1, 0.5)
     grid = np.append(grid[: max(1, len(grid) - 1)], end)
