@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from commonroad.common.solution import VehicleType
+from commonroad_dc.feasibility.feasibility_checker import state_transition_feasibility
+from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 
 from repair.vehicle.commonroad_ks import official_check
+from repair.vehicle.model import vehicle_model
 from repair.vehicle.parameters import load_vehicle
 from repair.vehicle.single_track import drive
 from repair.vehicle.states import DrivenStates
@@ -151,8 +158,29 @@ def test_ordinary_driving_is_accepted_without_asking(type_id, dt):
     assert official_check(states, dt, vehicle, range(0, 50, 10)).ok.all()
 
 
-def test_far_from_the_origin_the_checker_decides():
-    states = DrivenStates(*np.array([[0, 0.1], [2e6, 2e6 + 1.0], [5e6, 5e6], [0, 0], [10, 10], [0, 0]]))
-    report = direct_check(states, 0.1, load_vehicle(1))
-    assert not report.ok[0]
-    assert report.limit(0) == "position"
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_transition_is_judged_alike_wherever_it_is(kind):
+    rng = np.random.default_rng(KINDS.index(kind))
+    vehicle = load_vehicle(2)
+    for _ in range(2):
+        here = transition(kind, vehicle, 0.1, rng)
+        for far in (1e5, 5e6):
+            there = replace(here, x=here.x + far, y=here.y - far)
+            ours = [direct_check(states, 0.1, vehicle) for states in (here, there)]
+            np.testing.assert_allclose(ours[1].use, ours[0].use, rtol=1e-5, atol=1e-6)
+            clear = np.abs(ours[0].margin) > 1e-5
+            assert (ours[0].ok == ours[1].ok)[clear].all()
+            if not ours[0].ok.all():
+                words = [official_check(states, 0.1, vehicle).ok.tolist() for states in (here, there)]
+                assert words[0] == words[1]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_far_from_the_origin_the_checker_says_the_same_of_what_is_clear():
+    """As it is asked about files, without moving what is in them."""
+    vehicle, t = load_vehicle(1), np.arange(5) * 0.1
+    states = DrivenStates(t, 3e6 + 10.0 * t, 5e6 + 0.0 * t, 0.0 * t, 10.0 + 0.0 * t, 0.0 * t)
+    assert direct_check(states, 0.1, vehicle).ok.all()
+    ks = vehicle_model(1).to_commonroad(states, 0)
+    dynamics = VehicleDynamics.KS(VehicleType(1))
+    assert all(state_transition_feasibility(a, b, dynamics, 0.1)[0] for a, b in pairwise(ks))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from copy import copy
 from typing import Any
 
 import numpy as np
 
 from repair.deadline import OutOfTime, in_time
+from repair.vehicle.commonroad_ks import at_origin
 from repair.vehicle.parameters import load_vehicle
 from repair.vehicle.states import DrivenStates
 from repair.vehicle.transitions import direct_check
@@ -53,7 +53,7 @@ def first_refused(states: list[Any], model: str, type_id: int, dt: float) -> int
         try:
             with warnings.catch_warnings():  # of its integrator and optimiser, about inputs they only try
                 warnings.simplefilter("ignore")
-                feasible, _ = state_transition_feasibility(*_at_origin(states[k : k + 2]), dynamics, dt)
+                feasible, _ = state_transition_feasibility(*at_origin(states[k : k + 2]), dynamics, dt)
         except OutOfTime:
             raise
         except Exception:  # the checker wraps whatever happens into a bare Exception
@@ -72,13 +72,3 @@ def _unsure(states: list[Any], model: str, type_id: int, dt: float) -> list[int]
     driven = DrivenStates(np.arange(len(rows)) * dt, x, y, steering, speed, np.unwrap(psi))
     report = direct_check(driven, dt, load_vehicle(type_id))
     return [int(k) for k in np.flatnonzero(~report.ok)]
-
-
-def _at_origin(pair: list[Any]) -> list[Any]:
-    """Two states moved so that the first is at the origin: the checker's integrator is relative to places."""
-    moved = []
-    for state in pair:
-        other = copy(state)
-        other.position = np.asarray(state.position, dtype=np.float64) - pair[0].position
-        moved.append(other)
-    return moved

@@ -6,6 +6,7 @@ import sys
 import warnings
 from collections.abc import Iterable
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
     from repair.vehicle.states import DrivenStates
 
-__all__ = ["OfficialReport", "load_official", "official_check", "to_ks_states"]
+__all__ = ["OfficialReport", "at_origin", "load_official", "official_check", "to_ks_states"]
 
 _OFFICIAL = "commonroad_dc.feasibility.feasibility_checker"
 _IMPORT = 0.5  # what importing it takes at most [s]
@@ -54,7 +55,10 @@ def load_official() -> None:
 def official_check(
     states: DrivenStates, dt: float, vehicle: Vehicle, transitions: Iterable[int] | None = None
 ) -> OfficialReport:
-    """Ask the drivability checker about single transitions.
+    """Ask the drivability checker about single transitions, each moved so that it begins at the origin.
+
+    Whether a motion can be driven does not hang on where it is. The checker's integrator has errors relative
+    to the coordinates, which at those of UTM hide the slope of its cost from its optimiser now and then.
 
     Parameters
     ----------
@@ -97,16 +101,15 @@ def official_check(
     objective = timed if limited() else position_orientation_objective
     for i in asked.tolist():
         in_time()
-        values = [
-            (s.position[0], s.position[1], s.steering_angle, s.velocity, s.orientation) for s in ks[i : i + 2]
-        ]
+        pair = at_origin(ks[i : i + 2])
+        values = [(s.position[0], s.position[1], s.steering_angle, s.velocity, s.orientation) for s in pair]
         if not np.isfinite(values).all():
             reasons[i] = "a state is not finite"
             continue
         try:
             with warnings.catch_warnings():  # of its integrator and optimiser, about inputs they only try
                 warnings.simplefilter("ignore")
-                feasible, _ = state_transition_feasibility(ks[i], ks[i + 1], dynamics, dt, objective)
+                feasible, _ = state_transition_feasibility(*pair, dynamics, dt, objective)
         except Exception as error:  # the checker wraps whatever happens into a bare Exception
             cause = error.__cause__ or error
             if isinstance(cause, OutOfTime):
@@ -118,6 +121,16 @@ def official_check(
     return OfficialReport(
         asked, np.array([i not in reasons for i in asked.tolist()], dtype=np.bool_), reasons
     )
+
+
+def at_origin(pair: list[Any]) -> list[Any]:
+    """CommonRoad states moved so that the first of them is at the origin."""
+    moved = []
+    for state in pair:
+        other = copy(state)
+        other.position = np.asarray(state.position, dtype=np.float64) - pair[0].position
+        moved.append(other)
+    return moved
 
 
 def to_ks_states(states: DrivenStates, initial_time_step: int) -> list[Any]:

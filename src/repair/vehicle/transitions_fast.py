@@ -16,7 +16,6 @@ from repair.arrays import Array
 from repair.vehicle.transitions import (
     ACCEPTED,
     ENGINE,
-    FAR_OUT,
     ORIENTATION_TOLERANCE,
     POSITION_TOLERANCE,
     STEERING_RATE,
@@ -74,13 +73,7 @@ def clearly_drivable(
     ):
         return False
     shift, turned = _error_bounds(xy, rows[:3], orientation, largest, dt, vehicle)
-    # From one step to the next, the rear axle moves as far as simulated, or as far astray as bounded.
-    way = len(xy) * (fastest * dt + shift) + 2.0 * vehicle.rear
-    return (
-        turned <= _SURE * angle * ORIENTATION_TOLERANCE
-        and shift <= _SURE * position * POSITION_TOLERANCE
-        and max(map(abs, xy[0].tolist())) + way <= FAR_OUT
-    )
+    return turned <= _SURE * angle * ORIENTATION_TOLERANCE and shift <= _SURE * position * POSITION_TOLERANCE
 
 
 def _error_bounds(
