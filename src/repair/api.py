@@ -279,9 +279,10 @@ def search(
     if config.bound.wanted:
         with timed("bound"):
             bounds = bound(prepared, config.bound)
+    can = replace(backend.capabilities, helper=None)  # results are data
     return RepairResult(
-        prepared, found, driven.states, driven.peaks, timed.seconds, metrics, backend.capabilities, modes,
-        bounds, driven.terminal,
+        prepared, found, driven.states, driven.peaks, timed.seconds, metrics, can, modes, bounds,
+        driven.terminal,
     )  # fmt: skip
 
 

@@ -61,11 +61,15 @@ class Capabilities:
         residual ``obstacles`` says how far they are from it.
     uses_warm_start : bool
         A neighbouring curve is of use to it; others are handed none.
+    helper : callable or None
+        Makes the backend that the search asks where this one has found nothing. If the checker accepts a
+        curve of that one, this one is asked again, with that curve as guide and ``warm_start``.
     """
 
     relaxes: bool = False
     keeps_hull: bool = False
     uses_warm_start: bool = False
+    helper: Callable[[], RepairBackend] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,13 @@ class Closest:
         Keeps everything but the margin.
     miss : float
         By how much it misses the margin [m].
+    residuals : mapping
+        Its own, as :class:`SolveResult` has them.
     """
 
     curve: Curve
     miss: float
+    residuals: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -107,8 +114,8 @@ class SolveResult:
     stages : mapping
         Intermediate curves by name (``deformation``, ``refinement``).
     closest : Closest or None
-        With ``infeasible``: what the checker may accept all the same, because boxes in (s, l) are wider
-        than the vehicles in them.
+        What the checker may accept where there is no ``curve`` or that one is rejected: boxes in (s, l) are
+        wider than the vehicles in them.
     """
 
     status: SolveStatus
@@ -144,7 +151,17 @@ class RepairBackend(Protocol):
         warm_start: Curve | None = None,
         time_limit: float | None = None,
     ) -> SolveResult:
-        """Solve one repair; raises :class:`repair.errors.BackendError` for a malformed problem only."""
+        """Solve one repair; raises :class:`repair.errors.BackendError` for a malformed problem only.
+
+        Parameters
+        ----------
+        problem : RepairProblem
+        warm_start : Curve, optional
+            The last curve that was verified, of an earlier t_rep. One that begins at ``problem.t_rep`` was
+            verified there, as another backend's: ``closest`` may then be what comes nearest to it.
+        time_limit : float, optional
+            [s].
+        """
         ...
 
 
@@ -176,9 +193,12 @@ class BackendSpec:
         Packages without which it cannot be made.
     says : str
         One line for people.
+    helper : str
+        Name of the backend that :attr:`Capabilities.helper` makes; empty for none.
     """
 
     factory: Callable[[Any], RepairBackend] | str
     settings: type | None = None
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
+    helper: str = ""

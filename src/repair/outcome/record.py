@@ -115,7 +115,7 @@ def record_of(
         "t_end_s": number(prepared.t_end),
         "trajectory": _trajectory(prepared, found, states),
         "limits": _limits(prepared.limits),
-        "capabilities": asdict(capabilities),
+        "capabilities": {name: can for name, can in asdict(capabilities).items() if name != "helper"},
         "notes": [*prepared.notes, *filter(None, [one_point(prepared, found)])],
         "solution_file": None,
         "figure_files": [],

@@ -130,7 +130,7 @@ class ProblemFactory:
         Parameters
         ----------
         manoeuvre : Curve
-            From its time-to-repair on.
+            From its time-to-repair on: a fixed manoeuvre, or what a backend found.
         kind : Maneuver
             What it does about the conflict.
         """

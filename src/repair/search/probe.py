@@ -12,7 +12,7 @@ from repair.backend.base import RepairBackend, SolveResult, SolveStatus
 from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
-from repair.problem.problem import RepairProblem
+from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.result import Probe
 
 __all__ = [
@@ -48,6 +48,10 @@ class ProblemSource(Protocol):
     @property
     def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
         """By what a rejected problem is tightened, step by step: room [m], road [m], limits (shares)."""
+        ...
+
+    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+        """The problem at the start of a curve, with that curve as the guide; asked for with a helper only."""
         ...
 
 
@@ -163,14 +167,16 @@ def _judged(
     verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
     margin = problem.margin
     closest = solve.closest
-    if solve.curve is None and closest is not None and not problem.strict:
-        # The backend calls this infeasible, and so it stays; but boxes are wider than vehicles, and
-        # the checker may accept the curve that comes closest.
+    if not verdict.ok and closest is not None and not problem.strict:
+        # What the backend says of the problem stays; but boxes are wider than vehicles, and the checker
+        # may accept the curve that comes closest.
         again = checker.check(problem, closest.curve)
         if again.ok:
             margin -= closest.miss
             detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
-            solve, verdict = replace(solve, curve=closest.curve, detail=detail), again
+            residuals = closest.residuals or solve.residuals
+            solve = replace(solve, curve=closest.curve, detail=detail, residuals=residuals)
+            verdict = again
     return solve, verdict, margin
 
 

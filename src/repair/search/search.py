@@ -16,9 +16,9 @@ from repair.backend.base import RepairBackend
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime
-from repair.problem.problem import RepairProblem
+from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import other_ways, probe_again, too_close
-from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides
+from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides, words
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import Order, probe_order
 from repair.search.settings import SearchConfig
@@ -118,9 +118,44 @@ def _visit(
             again, _ = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
             tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
             probe = replace(again if again.feasible else probe, tried=tried)
+        if not probe.feasible and not budget.spent:
+            probe = _helped(probe, first, source, backend, checker, sides, budget)
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
+
+
+def _helped(
+    probe: Probe,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    budget: Budget,
+) -> Probe:
+    """The backend asked once more, from a curve of its helper that the checker accepts.
+
+    A hard backend gives up where its guides or its boxes leave it nothing; what has been verified proves that
+    there is a way. The helper's curve itself is no answer: it may keep less than this backend claims.
+    """
+    make = backend.capabilities.helper
+    if make is None or any(problem.strict for problem in first):
+        return probe
+    helper, t_rep = make(), probe.t_rep
+    found = _visit(t_rep, first, source, helper, checker, sides, None, budget)
+    if not found.feasible or found.solve.curve is None:
+        return probe
+    along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD)
+    again = probe_one(t_rep, along, backend, checker, found.solve.curve, budget)
+    said = f"from a curve of {helper.name} that passes every check"
+    tried = (*probe.tried, f"{words(again)} ({said})")
+    if again.feasible:
+        return replace(again, tried=tried)
+    why = again.solve.detail if again.solve.curve is None else words(again)
+    return replace(
+        probe, tried=tried, solve=replace(probe.solve, detail=f"{probe.solve.detail}; {said}: {why}")
+    )
 
 
 def _given(visits: Sequence[float]) -> Order:

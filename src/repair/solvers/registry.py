@@ -6,19 +6,24 @@ an installed package: group ``repair.backends``, each a :class:`repair.backend.b
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, replace
+from functools import cache
 from importlib import import_module
 from typing import Any
 
 from repair.backend.base import BackendSpec, Capabilities, Configuration, RepairBackend
 from repair.baselines.qptr.settings import QptrConfig
+from repair.deadline import in_time
 from repair.errors import BackendError
 from repair.registry import Registry, loaded
 from repair.solvers.casadi.settings import CasadiConfig
 from repair.solvers.ego.settings import EgoConfig
 
 __all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
+
+_IMPORT = 1.0  # [s] what importing a backend may take on a slow machine
 
 BACKENDS: Registry[BackendSpec] = Registry(
     "backend",
@@ -34,6 +39,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             CasadiConfig,
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
+            helper="ego",
         ),
         "qptr": BackendSpec(
             "repair.baselines.qptr.backend:make",
@@ -130,4 +136,19 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
         raise BackendError(
             f"backend {name!r} declares no capabilities; it needs an attribute capabilities = Capabilities()"
         )
+    if spec.helper:
+        made.capabilities = replace(made.capabilities, helper=_helper(spec.helper, config))
+    return made
+
+
+def _helper(name: str, config: Configuration) -> Callable[[], RepairBackend]:
+    """Makes a backend when it is first asked for."""
+
+    @cache
+    def made() -> RepairBackend:
+        factory = BACKENDS[name].factory
+        if isinstance(factory, str) and factory.partition(":")[0] not in sys.modules:
+            in_time(_IMPORT, f"importing the backend {name!r}")
+        return make_backend(name, config)
+
     return made

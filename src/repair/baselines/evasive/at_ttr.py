@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from repair.baselines.evasive.maneuvers import EvasiveManeuver
 from repair.baselines.evasive.times import EvasiveResult
+from repair.curves.base import Curve
 from repair.problem.factory import ProblemFactory
 from repair.problem.problem import Maneuver, RepairProblem
 
@@ -70,3 +71,7 @@ class AtTtr:
     def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
         """As the search has them: see :attr:`repair.search.probe.ProblemSource.notches`."""
         return self.factory.notches
+
+    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+        """The problem at the start of a curve, with that curve as the guide."""
+        return self.factory.along(manoeuvre, kind)

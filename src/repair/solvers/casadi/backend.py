@@ -43,12 +43,12 @@ from repair.deadline import OutOfTime, until
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out
-from repair.solvers.casadi.model import TOLERANCE, build_model, status_of
+from repair.solvers.casadi.model import TOLERANCE, Model, build_model, status_of
 from repair.solvers.casadi.residuals import largest_violation, residuals_of, start_violation, worst_family
 from repair.solvers.casadi.rows import Structure
 from repair.solvers.casadi.separation import Separation, separate
 from repair.solvers.casadi.settings import CasadiConfig
-from repair.solvers.casadi.sides import open_sides
+from repair.solvers.casadi.sides import keeping_to, no_nearer, open_sides
 from repair.timegrid import INSTANT
 
 __all__ = ["WINDOW", "CasadiBackend", "make"]
@@ -99,6 +99,8 @@ class CasadiBackend:
                 instance, points = lay_out(problem, model)
                 built, before = time.perf_counter(), model.build_time
                 result = self._rounds(instance, points, warm_start, deadline, time_limit)
+                if warm_start is not None and abs(warm_start.t_start - problem.t_rep) <= INSTANT:
+                    result = self._nearest(result, problem, model, warm_start, deadline)
         except OutOfTime as over:
             spent = time.perf_counter() - begin
             return SolveResult(SolveStatus.TIME_LIMIT, build_time=spent, detail=_cut(time_limit, over))
@@ -193,6 +195,53 @@ class CasadiBackend:
         objective = instance.objective(points)
         return SolveResult(status, curve, objective, iterations, detail=detail, residuals=residuals)
 
+    def _nearest(
+        self, result: SolveResult, problem: RepairProblem, model: Model, curve: Curve, deadline: float | None
+    ) -> SolveResult:
+        """With what is nearest to a verified curve and keeps all rows, of the margin as much as that curve.
+
+        Nearest by the objective's own weights; the curve itself where it keeps the rows.
+        """
+        instance, kept, verified = keeping_to(problem, model, curve)
+        if kept.why:
+            return replace(result, detail=f"{result.detail}; the verified curve: {kept.why}")
+        broken = residuals_of(instance, kept, verified)
+        detail = result.detail
+        if largest_violation(broken) > TOLERANCE:
+            detail += f"; of the verified curve {worst_family(broken)}"
+        # No nearer to an obstacle than it is, at any time; or else at the closest.
+        for separation in (no_nearer(instance, kept, verified), kept):
+            points = self._projected(instance, separation, verified, deadline)
+            if points is not None:
+                miss = problem.margin - instance.problem.margin
+                residuals = residuals_of(instance, separation, points) | {"obstacles": miss}
+                nearest = Closest(self._curve(instance, points), miss, residuals)
+                return replace(result, closest=nearest, detail=detail)
+        return replace(result, detail=f"{detail}, and nothing near it keeps all rows")
+
+    def _projected(
+        self, instance: Instance, separation: Separation, verified: Array, deadline: float | None
+    ) -> Array | None:
+        """The control points nearest to given ones that keep all rows; None where none are found."""
+        model, points = instance.model, verified
+        p, axes = model.structure.degree, model.structure.axes
+        slope = -(model.hessian[p:, p:] @ verified[p:])[:, :axes].T.ravel()
+        for round_ in range(self.config.rounds + 1):
+            if largest_violation(residuals_of(instance, separation, points)) <= TOLERANCE:
+                return points
+            if round_:
+                bounds = instance.bounds(separation, points, _TRUST * 0.5**round_)
+                points, status, _, _ = self._run(instance, points, *bounds, deadline, slope)
+                if status is not SolveStatus.SOLVED:
+                    return None
+            else:  # the linear rows alone
+                bounds = instance.bounds(separation, None, modest=True)
+                x, _ = model.presolve(model.unknowns(points), slope, *bounds)
+                if x is None:
+                    return None
+                points = model.with_unknowns(points, x)
+        return None
+
     def _curve(self, instance: Instance, points: Array) -> UniformBSpline:
         t_rep = instance.problem.t_rep
         return UniformBSpline(t_rep, self.spacing, self.degree, frozen(points + instance.origin))
@@ -231,11 +280,18 @@ class CasadiBackend:
         return warm if max(residuals_of(instance, separation, warm).values()) < worst else points
 
     def _run(
-        self, instance: Instance, points: Array, low: Array, high: Array, deadline: float | None
+        self,
+        instance: Instance,
+        points: Array,
+        low: Array,
+        high: Array,
+        deadline: float | None,
+        slope: Array | None = None,
     ) -> tuple[Array, SolveStatus, str, int]:
         """One NLP: the new control points, the status, the solver's word, the iterations."""
         model = instance.model
-        x0, slope, data = model.unknowns(points), instance.slope, instance.sample_data(points)
+        x0, data = model.unknowns(points), instance.sample_data(points)
+        slope = instance.slope if slope is None else slope
         solution = model.solve(x0, data, slope, low, high, deadline)
         status, word = status_of(model, solution), solution.word
         if model.structure.solver != "ipopt" and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array
+from repair.curves.base import Curve
+from repair.curves.bspline import UniformBSpline
+from repair.curves.fitting import fit_to_curve
 from repair.deadline import in_time
-from repair.solvers.casadi.instance import Instance, guide_of
+from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem
+from repair.solvers.casadi.instance import Instance, guide_of, lay_out
+from repair.solvers.casadi.model import Model
 from repair.solvers.casadi.residuals import residuals_of
 from repair.solvers.casadi.separation import SIDE_OF_BOUND, Separation, separate
 
-__all__ = ["Opening", "open_sides"]
+__all__ = ["Opening", "keeping_to", "no_nearer", "open_sides"]
 
 _SIDES = 4  # sets of sides that are tried
+_GIVEN = 1e-3  # [m] of a margin that is given up beyond what a curve gives up, for what is to stay near it
 
 
 class Opening(NamedTuple):
@@ -95,6 +103,62 @@ def open_sides(instance: Instance, points: Array) -> Opening:
         shape = instance.shape(points)
         room = instance.room(shape)
     return Opening(separation, points, why, closest)
+
+
+def keeping_to(problem: RepairProblem, model: Model, curve: Curve) -> tuple[Instance, Separation, Array]:
+    """A problem with the sides of a curve, and of its margin only what that curve keeps.
+
+    Returns
+    -------
+    instance : Instance
+    separation : Separation
+    points : (n, 2) array
+        The curve's control points, less the origin.
+    """
+    instance, separation, points = _around(problem, model, curve)
+    if instance.boxes is not None and len(instance.boxes.start):
+        # As far as the start is inside of an obstacle, on the side on which it is the least.
+        inside = float(np.nan_to_num(instance.boxes.start, nan=np.inf).max(axis=1).min())
+        if inside < min(problem.margin, 0.0):
+            instance, separation, points = _around(replace(problem, margin=inside), model, curve)
+    missed = 0.0 if separation.why else residuals_of(instance, separation, points)["obstacles"]
+    if missed > 0.0:
+        less = replace(problem, margin=instance.problem.margin - missed - _GIVEN)
+        instance, separation, points = _around(less, model, curve, separation.side)
+    return instance, separation, points
+
+
+def no_nearer(instance: Instance, separation: Separation, points: Array) -> Separation:
+    """The same sides, with nobody to be passed nearer than a curve of these control points passes them."""
+    if separation.claims is None:
+        return separation
+    asked = np.isfinite(separation.claims.max(axis=1)).swapaxes(0, 1)  # (W, C, 4)
+    table = np.zeros((len(separation.lower), asked.shape[-1]), dtype=np.bool_)
+    np.logical_or.at(table, separation.windows.row, asked)
+    place = instance.model.obstacle @ points + instance.origin
+    lower, upper = separation.lower.copy(), separation.upper.copy()
+    for side, axis in enumerate(SIDE_AXIS.tolist()):
+        rows = table[:, side]
+        if SIDE_SIGN[side] > 0.0:
+            lower[rows, axis] = np.maximum(lower[rows, axis], place[rows, axis] - _GIVEN)
+        else:
+            upper[rows, axis] = np.minimum(upper[rows, axis], place[rows, axis] + _GIVEN)
+    return replace(separation, lower=lower, upper=upper)
+
+
+def _around(
+    problem: RepairProblem, model: Model, curve: Curve, side: npt.NDArray[np.intp] | None = None
+) -> tuple[Instance, Separation, Array]:
+    n, p, h = model.structure.n, model.structure.degree, model.structure.spacing
+    instance, points = lay_out(problem, model)
+    fit = fit_to_curve(curve, problem.t_rep, n, p, h)
+    if isinstance(curve, UniformBSpline) and (len(curve.points), curve.degree, curve.spacing) == (n, p, h):
+        fit = curve
+    points[p:] = fit.points[p:] - instance.origin
+    shape = instance.shape(points)
+    room, rows = instance.room(shape), len(model.obstacle)
+    separation = separate(problem, instance.windows, rows, shape, room, side, instance.boxes)
+    return instance, separation, points
 
 
 def _missed(instance: Instance, separation: Separation, points: Array, miss: float) -> str:
