@@ -116,12 +116,14 @@ def test_a_helpers_curve_is_no_answer_by_itself_and_the_reason_is_said():
     assert all("soft" not in text for probe in nothing.probes for text in probe.tried)
 
 
-def test_no_time_to_make_the_helper_cuts_the_search():
+def test_without_time_to_make_the_helper_the_search_goes_on_without():
     def late():
-        raise OutOfTime("importing")
+        raise OutOfTime("importing takes long")
 
-    found = search(Hard(Capabilities(helper=late)), time_limit=100.0)
-    assert not found.complete
+    found, alone = search(Hard(Capabilities(helper=late)), time_limit=100.0), search(Hard(Capabilities()))
+    assert found.complete
+    assert [probe.t_rep for probe in found.probes] == [probe.t_rep for probe in alone.probes]
+    assert found.probes[0].tried[-1] == "no other backend asked: importing takes long"
 
 
 def test_the_registry_makes_the_helper_once_and_when_it_is_asked_for():

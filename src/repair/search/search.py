@@ -142,7 +142,10 @@ def _helped(
     make = backend.capabilities.helper
     if make is None or any(problem.strict for problem in first):
         return probe
-    helper, t_rep = make(), probe.t_rep
+    try:
+        helper, t_rep = make(), probe.t_rep
+    except OutOfTime as late:  # the search goes on without
+        return replace(probe, tried=(*probe.tried, f"no other backend asked: {late}"))
     found = _visit(t_rep, first, source, helper, checker, sides, None, budget)
     if not found.feasible or found.solve.curve is None:
         return probe

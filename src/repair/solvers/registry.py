@@ -23,7 +23,7 @@ from repair.solvers.ego.settings import EgoConfig
 
 __all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
 
-_IMPORT = 1.0  # [s] what importing a backend may take on a slow machine
+_IMPORT = 0.05  # [s] what importing a backend may take, the packages that it needs being there
 
 BACKENDS: Registry[BackendSpec] = Registry(
     "backend",
