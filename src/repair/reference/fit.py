@@ -25,7 +25,7 @@ _DEGREE = 3
 _SPACING = 0.4  # knots of a spline through recorded positions are at most this far apart [s], or two steps
 _SPEED_OFF = 0.05  # a recording that starts faster or slower than the ego by more has its own speed [m/s]
 _FIT_OFF = 0.05  # a spline farther from the positions than this [m] gets more freedom
-_ROUGH = 2.0  # an acceleration that changes by more within a step comes from rounding [m/s²]
+_ROUGH = 2.0  # accelerations that swing and jump by more come from rounding [m/s²]
 _DENSE = 0.5  # positions between the steps are at most this far apart [m]
 _PARTS = 4  # of a step, at whose ends a curve is looked at
 
@@ -67,14 +67,23 @@ def fit_recording(scene: Scene, recording: Recording, *, noisy: bool = False) ->
         0.0, scene.dt, coordinates, _in_frame(scene, coordinates, recording.velocities)
     )
     first = _drivable_until(scene, exact)
-    within = exact.derivative_points(2)[..., 0]
-    rough = float(np.abs(np.diff(within, axis=1)).max()) > _ROUGH
+    rough = _roughness(exact) > _ROUGH
     if rough or np.isfinite(first):
         smooth, off = _smooth(scene, recording, coordinates)
         then = _drivable_until(scene, smooth) if off <= _FIT_OFF else 0.0
         if then > first or (rough and then == first):
             return smooth
     return exact
+
+
+def _roughness(exact: BernsteinCurve) -> float:
+    """By how much accelerations along the path swing within steps and jump back between them [m/s²].
+
+    Constant inputs jump and do not swing, smooth motion swings and does not jump; rounding does both.
+    """
+    begin, end = exact.derivative_points(2)[..., 0].T
+    swing, jump = np.abs(end - begin), np.abs(begin[1:] - end[:-1])
+    return float(np.minimum(np.minimum(swing[1:], swing[:-1]), jump).max(initial=0.0))
 
 
 def between_steps(recording: Recording, dt: float) -> Array:
