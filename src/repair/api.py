@@ -315,9 +315,10 @@ def find(
         load_official()
     backend = Guarded(backend, prepared.config.backend)
     if prepared.config.driver != "at_ttr":
+        own_way = backend.capabilities.own_way
         return search_f_ttr(
-            prepared.source, prepared.conflict, backend, prepared.judge, settings,
-            visits=visits, on_probe=on_probe,
+            prepared.unguided if own_way else prepared.source, prepared.conflict, backend, prepared.judge,
+            settings, visits=visits, on_probe=on_probe,
         )  # fmt: skip
     begin = time.perf_counter()
     try:

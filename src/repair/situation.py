@@ -10,7 +10,7 @@ from repair.arrays import Array, in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
-from repair.problem.factory import ProblemFactory
+from repair.problem.factory import ProblemFactory, Unguided
 from repair.problem.limits import Limits
 from repair.problem.settings import RepairConfig
 from repair.terminal.judge import EndJudge
@@ -68,9 +68,19 @@ class Situation:
     @cached_property
     def source(self) -> ProblemFactory:
         """The repair problems of any t_rep."""
-        limits = self.limits.reserving(self.settings.reserve)
-        occupancy = with_boxes(self.occupancy, self.dead_ends)
-        return ProblemFactory(self.scene, self.settings, limits, occupancy, self.reference, self.t_end)
+        return self._factory(self.limits.reserving(self.settings.reserve))
+
+    @cached_property
+    def unguided(self) -> Unguided:
+        """Those for backends that find their own way: no guide, and the limits to the full."""
+        return Unguided(self._factory(self.limits))
+
+    def _factory(self, limits: Limits) -> ProblemFactory:
+        checker, occupancy = self.checker, with_boxes(self.occupancy, self.dead_ends)
+        return ProblemFactory(
+            self.scene, self.settings, limits, occupancy, self.reference, self.t_end,
+            checker.config.clearance, checker.road,
+        )  # fmt: skip
 
     @cached_property
     def dead_ends(self) -> list[tuple[Array, Array]]:

@@ -31,6 +31,7 @@ def factory(boxes, reference=BRAKING, t_end=T_END, lateral="road"):
         same_direction=toy.NARROW,
         road=toy.WIDE,
         vehicle=load_vehicle(1),
+        obstacles=(),
     )
     config = load_config(overrides=[f"repair.lateral={lateral}"])
     return ProblemFactory(scene, config.repair, toy.LIMITS, toy.occupancy(*boxes), reference, t_end)

@@ -61,6 +61,11 @@ class Capabilities:
         residual ``obstacles`` says how far they are from it.
     uses_warm_start : bool
         A neighbouring curve is of use to it; others are handed none.
+    own_way : bool
+        It finds its own way past the obstacles: it is asked once for each t_rep, with all the room there is,
+        without a guide (``problem.passing`` is None), and with the true shapes (``problem.shapes``).
+    jumps : bool
+        The acceleration of its curves may jump, at t_rep too, as an input of the vehicle's model may.
     helper : callable or None
         Makes the backend that the search asks where this one has found nothing. If the checker accepts a
         curve of that one, this one is asked again, with that curve as guide and ``warm_start``.
@@ -69,6 +74,8 @@ class Capabilities:
     relaxes: bool = False
     keeps_hull: bool = False
     uses_warm_start: bool = False
+    own_way: bool = False
+    jumps: bool = False
     helper: Callable[[], RepairBackend] | None = None
 
 

@@ -101,8 +101,8 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
 
     rows: list[CertificateRow] = []
     if curve is not None:
-        rows += seam_rows(prepared.reference, curve, t_rep)
         said = content.get("capabilities") or {}
+        rows += seam_rows(prepared.reference, curve, t_rep, jumps=bool(said.get("jumps", False)))
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
         allowed, margin = boxes_kept(content), prepared.config.checker.margin
         rows += clearance_rows(curve, prepared.occupancy, dt, t_end, allowed, margin)

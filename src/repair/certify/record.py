@@ -109,8 +109,9 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
         backend = make_backend(config.backend, config)
         capabilities, at_ttr = backend.capabilities, config.driver == "at_ttr"
         around = AtTtr(prepared.source, asked.evasive) if at_ttr else None
+        free = prepared.unguided if capabilities.own_way else prepared.source
         found = search_f_ttr(
-            around or prepared.source, prepared.conflict, backend, prepared.judge,
+            around or free, prepared.conflict, backend, prepared.judge,
             replace(config.search, time_limit=None), visits=around.visits if around else None,
         )  # fmt: skip
         wanted += ["ttr"] if at_ttr and found.complete and "ttr" not in wanted else []

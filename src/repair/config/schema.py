@@ -40,7 +40,7 @@ class Config:
         "f_ttr: the search over the time-to-repair; at_ttr: one repair at the TTR (the paper's baseline)",
         choices=("f_ttr", "at_ttr"),
     )
-    backend: str = setting("ego", "ego, casadi, qptr, or one that is registered")
+    backend: str = setting("ego", "ego, casadi, qptr, shooting, or one that is registered")
     metrics: list[str] = setting(
         factory=list, says="metrics of the reference that the result is to hold", registry="metric"
     )

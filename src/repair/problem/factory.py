@@ -15,17 +15,19 @@ from repair.problem.limits import Limits
 from repair.problem.passing import open_passings
 from repair.problem.problem import Maneuver, Passing, RepairProblem
 from repair.problem.settings import RepairConfig
+from repair.problem.shapes import Shapes
 from repair.problem.surroundings import Surroundings, sides_of, surroundings
 from repair.problem.tables import Grid
 from repair.scene.road.bounds import LateralBounds
 from repair.timegrid import INSTANT, intervals
 from repair.world.boxes import Occupancy
 from repair.world.occupancy import near, relevant
+from repair.world.road import RoadBoundary
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["ProblemFactory"]
+__all__ = ["ProblemFactory", "Unguided"]
 # Where the lateral room is looked up, from the hindmost to the foremost place within reach.
 _SHARES = frozen(np.linspace(0.0, 1.0, 50))
 
@@ -44,6 +46,10 @@ class ProblemFactory:
     reference : Curve
     t_end : float
         End of every repair [s].
+    room : float
+        What the checker wants around the ego's rectangle [m].
+    boundary : RoadBoundary or None
+        What it wants that rectangle to lie in.
     """
 
     scene: Scene
@@ -52,12 +58,19 @@ class ProblemFactory:
     occupancy: Occupancy
     reference: Curve
     t_end: float
+    room: float = 0.0
+    boundary: RoadBoundary | None = None
 
     @cached_property
     def bounds(self) -> LateralBounds:
         """Lateral room of the reference point, as ``repair.lateral`` says."""
         wide = {"lane": self.scene.lane, "same_direction": self.scene.same_direction, "road": self.scene.road}
         return wide.get(self.settings.lateral, self.scene.lane)
+
+    @cached_property
+    def _shapes(self) -> Shapes:
+        scene = self.scene
+        return Shapes(scene.frame, scene.obstacles, scene.vehicle, scene.dt, self.room, self.boundary)
 
     @cached_property
     def _grid(self) -> Grid | None:
@@ -124,6 +137,16 @@ class ProblemFactory:
             for passing in passings
         )  # fmt: skip
 
+    def without_guide(self, t_rep: float) -> tuple[RepairProblem, ...]:
+        """One problem with all the room there is, and no way past the obstacles chosen."""
+        settings, step = self.settings, self.scene.dt
+        if t_rep > self.t_end - step + INSTANT:
+            return ()
+        times = t_rep + step * np.arange(intervals(self.t_end - t_rep, step) + 1)
+        lateral = settings.lateral != "none"
+        _, start, occupancy, _ = self._scenery(t_rep, times, settings.margin, lateral)
+        return (self._problem(t_rep, start, occupancy, settings.margin, None, lateral),)
+
     def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
         """The problem at the start of a manoeuvre, with the manoeuvre as the guide, open or not.
 
@@ -174,6 +197,7 @@ class ProblemFactory:
             half_length=self.scene.vehicle.half_length,
             strict=not self.settings.relax,
             lateral=lateral,
+            shapes=self._shapes,
         )
 
     def _scenery(
@@ -216,3 +240,32 @@ class ProblemFactory:
             rightmost, leftmost = float(right.min()), float(left.max())
         margin = self.settings.margin + self.settings.clearance
         return (behind, ahead), (rightmost - margin, leftmost + margin)
+
+
+@dataclass(frozen=True)
+class Unguided:
+    """Makes one problem for each t_rep (a :class:`repair.search.probe.ProblemSource`)."""
+
+    factory: ProblemFactory
+
+    def at(self, t_rep: float) -> tuple[RepairProblem, ...]:
+        """See :meth:`ProblemFactory.without_guide`."""
+        return self.factory.without_guide(t_rep)
+
+    def relaxed(self, t_rep: float) -> tuple[tuple[RepairProblem, ...], ...]:
+        """None: who looks at true shapes has no boxes to give up."""
+        return ()
+
+    def widened(self, t_rep: float) -> tuple[tuple[RepairProblem, ...], ...]:
+        """None, for the same reason."""
+        return ()
+
+    @property
+    def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """The road and the limits, as for the others; nobody wants more room than the checker."""
+        _, edge, ease = self.factory.notches
+        return (), edge, ease
+
+    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+        """See :meth:`ProblemFactory.along`."""
+        return self.factory.along(manoeuvre, kind)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.limits import Limits
+from repair.problem.shapes import Shapes
 from repair.scene.road.bounds import LateralBounds
 from repair.world.boxes import Occupancy
 
@@ -120,6 +121,8 @@ class RepairProblem:
         Whether the backend may move sideways; if not, l stays on the reference.
     strict : bool
         No part of the margin may be given up, whatever the checker says of the true rectangles.
+    shapes : Shapes or None
+        What the boxes stand for, in the plane; None where only the boxes are known.
     """
 
     reference: Curve
@@ -138,6 +141,7 @@ class RepairProblem:
     half_length: float
     lateral: bool = True
     strict: bool = False
+    shapes: Shapes | None = None
 
     def tightened(self, room: float, edge: float, unused: float) -> RepairProblem:
         """The same way past the obstacles, to be kept with more to spare.

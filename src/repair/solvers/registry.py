@@ -20,6 +20,7 @@ from repair.errors import BackendError
 from repair.registry import Registry, loaded
 from repair.solvers.casadi.settings import CasadiConfig
 from repair.solvers.ego.settings import EgoConfig
+from repair.solvers.shooting.settings import ShootingConfig
 
 __all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
 
@@ -46,6 +47,12 @@ BACKENDS: Registry[BackendSpec] = Registry(
             QptrConfig,
             ("qpsolvers",),
             "Bernstein QP in a convex driving corridor (baseline)",
+        ),
+        "shooting": BackendSpec(
+            "repair.solvers.shooting.backend:make",
+            ShootingConfig,
+            (),
+            "controls of the single-track model drawn at random (cross-entropy), true shapes, no guide",
         ),
     },
     error=BackendError,

@@ -1,0 +1,1 @@
+"""Direct shooting: controls of the vehicle drawn at random, driven, and drawn again around the best."""
