@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from repair.arrays import Array
+from repair.bounds.edges import no_road
 from repair.bounds.motion import Motions
-from repair.bounds.obstacles import Occupied, occupied
+from repair.bounds.obstacles import Occupied, occupied, with_standing
 from repair.bounds.settings import BoundConfig
 from repair.bounds.start import driven_within, motions_from
 from repair.bounds.tree import Attempt, attempt
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Bound", "Proof", "bound"]
 
+_AROUND = 40.0  # where the edge of the road is looked at [m]
 _DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
 
 
@@ -126,18 +128,33 @@ class _World:
         self.stop = min(steps_until(min(last, situation.t_end), self.h), scene.n_steps * self.substeps) + 1
         self.end = min(steps_until(situation.conflict.time, self.h), len(self.states) - 1)
         self.stride = max(1, round(settings.step / self.h))
+        self.road = settings.road
         start = scene.initial_state
         near = checker.world.met_at(0, complex(start.x, start.y), start.orientation, checker.config.clearance)
         count = scene.n_steps * self.substeps + 1
         self.whole = occupied(scene.obstacles, count, self.substeps)
         # the margin of who is beside the ego at the start does not count until it has been left
         self.counted = ~np.isin(self.whole.owner, list(near)) if near else None
+        self._known: dict[str, Occupied] = {}
 
     def shapes(self, kind: str) -> Occupied:
         """What is met, for a kind of motions."""
-        if kind == "vehicle" or self.counted is None:
-            return self.whole
-        return Occupied(self.whole.vertices[:, self.counted], self.whole.owner[self.counted])
+        if kind not in self._known:
+            traffic = self.whole
+            if kind == "search" and self.counted is not None:
+                traffic = Occupied(traffic.vertices[:, self.counted], traffic.owner[self.counted])
+            self._known[kind] = with_standing(traffic, self._no_road(kind))
+        return self._known[kind]
+
+    def _no_road(self, kind: str) -> list[Array]:
+        """Convex pieces of what is no road, around where the conflict is."""
+        if not self.road or self.checker.road is None:
+            return []
+        k = max(self.end, 0)
+        margin = math.sqrt(2.0) * self.checker.config.clearance if kind == "search" else 0.0
+        return no_road(
+            self.checker.road.region, np.array([self.states.x[k], self.states.y[k]]), _AROUND, margin
+        )
 
     def instants(self, k: int) -> Array:
         """Samples that are looked at after a reaction at a sample, which is the first of them."""

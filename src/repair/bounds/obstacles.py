@@ -14,7 +14,10 @@ from repair.world.tracks import BEFORE, CIRCLE, INSTANT, MOVING, POLYGON, Index,
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
 
-__all__ = ["Occupied", "occupied"]
+__all__ = ["NO_ROAD", "Occupied", "occupied", "with_standing"]
+
+#: The owner of a piece of what is no road.
+NO_ROAD = -1
 
 _AROUND = np.exp(2j * np.pi * np.arange(16) / 16).view(np.float64).reshape(-1, 2)
 _CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
@@ -29,7 +32,7 @@ class Occupied(NamedTuple):
     vertices : (I, M, K, 2) array
         Anticlockwise [m]; the last is repeated to fill K, NaN where there is nothing.
     owner : (M,) int array
-        Index of the obstacle; -1 for what is no road.
+        Index of the obstacle; ``NO_ROAD`` for what is none.
     """
 
     vertices: Array
@@ -64,6 +67,21 @@ def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Oc
         vertices[:, m, : part.shape[1]] = part
         vertices[:, m, part.shape[1] :] = part[:, -1:]
     return Occupied(vertices, np.array(owner, dtype=np.intp))
+
+
+def with_standing(traffic: Occupied, pieces: Sequence[Array]) -> Occupied:
+    """The traffic, and convex pieces (K, 2) of what is no road, which stand."""
+    if not pieces:
+        return traffic
+    size = max(traffic.vertices.shape[2], *(len(piece) for piece in pieces))
+    count = len(traffic.owner)
+    vertices = np.empty((len(traffic.vertices), count + len(pieces), size, 2))
+    vertices[:, :count, : traffic.vertices.shape[2]] = traffic.vertices
+    vertices[:, :count, traffic.vertices.shape[2] :] = traffic.vertices[:, :, -1:]
+    for m, piece in enumerate(pieces, count):
+        vertices[:, m, : len(piece)], vertices[:, m, len(piece) :] = piece, piece[-1]
+    owner = np.concatenate((traffic.owner, np.full(len(pieces), NO_ROAD, dtype=np.intp)))
+    return Occupied(vertices, owner)
 
 
 def _one_reading(obstacle: Obstacle) -> bool:

@@ -25,6 +25,9 @@ class BoundConfig:
         choices=KINDS,
         only_with=_WITH,
     )
+    road: bool = setting(
+        True, "who leaves the road has not avoided the conflict (with checker.road)", only_with=_WITH
+    )
     step: float = setting(
         0.025, "resolution of the bound [s]; at least that of checker.substeps", low=1e-3, high=1.0,
         only_with=_WITH,

@@ -15,7 +15,7 @@ from repair.certify.traffic import Traffic
 if TYPE_CHECKING:
     from repair.preparation import Prepared
 
-__all__ = ["ContactTime", "contact_rows", "contact_time_row", "road_rows", "traffic_words"]
+__all__ = ["ContactTime", "contact_rows", "contact_time_row", "road_of", "road_rows", "traffic_words"]
 
 _CONTACT_TIME = (
     5e-3  # the contact of a reference is found to a millisecond, on another polygon of its way [s]

@@ -117,7 +117,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows += start_rows(states, problem, scene.vehicle, given=prepared.config.reference.source == "file")
     rows += agreement_rows(states, planned, scene.vehicle, dt, first)
     rows += _record_rows(content, prepared, curve, states, traffic)
-    rows += late_rows(folder, content, prepared, traffic, _reference(content, prepared))
+    rows += late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)
     rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap)
     return Certificate(
@@ -140,7 +140,7 @@ def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
     scene, anew = prepared.scene, read_file(path)
     problem = anew.problems[scene.planning_problem_id]
     traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
-    rows = late_rows(folder, content, prepared, traffic, _reference(content, prepared))
+    rows = late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
     scenario, backend, status = (str(content.get(name)) for name in ("scenario", "backend", "status"))
     words = traffic_words(traffic)
     return Certificate(folder, scenario, backend, status, None, tuple(rows), *_under(prepared), words)

@@ -6,6 +6,7 @@ import gzip
 import json
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from repair.certify.contact import outlines
 from repair.certify.late.assumed import OFF, Assumed, assumed
 from repair.certify.late.tree import Wrong, leaves
 from repair.certify.motion import Motion, wrapped
+from repair.certify.plane import road_of
 from repair.certify.traffic import Body, Traffic
 from repair.errors import RepairError
 
@@ -26,11 +28,17 @@ __all__ = ["late_rows"]
 
 _ROUNDING = 1e-6  # [m] by which a shape may be outside of what it stands for: files hold micrometres
 _STEP = 0.025  # over which the reference's acceleration is looked at [s]
+_NO_ROAD = -1  # stands in the file for what is none
 _LARGEST = 50_000_000  # bytes of a proof: more is none
 
 
 def late_rows(
-    folder: Path, content: Mapping[str, Any], prepared: Prepared, traffic: Traffic, reference: Motion
+    folder: Path,
+    content: Mapping[str, Any],
+    prepared: Prepared,
+    scenario: Any,
+    traffic: Traffic,
+    reference: Motion,
 ) -> list[CertificateRow]:
     """Whether it is too late from the times on that the record says, by the proofs in the folder.
 
@@ -41,8 +49,10 @@ def late_rows(
         What ``result.json`` holds.
     prepared : Prepared
         For vehicle, limits and reference.
+    scenario : commonroad.scenario.scenario.Scenario
+        Read anew, for the road.
     traffic : Traffic
-        Read anew.
+        Likewise.
     reference : Motion
         The reference, driven anew.
     """
@@ -51,11 +61,12 @@ def late_rows(
         return []
     claims = {k: float(one["t_bound_s"]) for k, one in told["kinds"].items() if one["t_bound_s"] is not None}
     proofs = _read(folder / str(told["proof_file"]))["kinds"] if claims else {}
+    taken = _Taken(prepared, scenario, traffic)
     rows = []
     for kind, time in claims.items():
         name = f"too late from {time:g} s on ({kind})"
         try:
-            count = _holds(kind, time, proofs[kind], prepared, traffic, reference)
+            count = _holds(kind, time, proofs[kind], prepared, taken, reference)
         except Wrong as wrong:
             rows.append(said(name, False, "exact", str(wrong)))
         except (KeyError, IndexError, TypeError, ValueError, OverflowError, ZeroDivisionError) as error:
@@ -81,9 +92,7 @@ def _read(file: Path) -> Any:
         raise RepairError(f"the proof {file} cannot be read: {error}") from error
 
 
-def _holds(
-    kind: str, time: float, proof: Any, prepared: Prepared, traffic: Traffic, reference: Motion
-) -> int:
+def _holds(kind: str, time: float, proof: Any, prepared: Prepared, taken: _Taken, reference: Motion) -> int:
     """Number of leaves of a proof that holds.
 
     Raises
@@ -100,9 +109,8 @@ def _holds(
     _followed(kind, m, time, prepared, reference)
     if time + float(proof["instants_s"][-1]) > prepared.t_end + 1e-9:
         raise Wrong("it looks at what is later than the repairs")
-    beside = _beside(prepared, traffic) if kind == "search" else frozenset()
     for one in proof["places"]:
-        _occupied(one, time + float(proof["instants_s"][one["instant"]]), place, prepared, traffic, beside)
+        taken.require(kind, one, time + float(proof["instants_s"][one["instant"]]), place)
     return leaves(m, proof)
 
 
@@ -148,39 +156,57 @@ def _followed(kind: str, m: Assumed, time: float, prepared: Prepared, reference:
         raise Wrong("the reference goes beyond what is assumed, so that later times are another question")
 
 
-def _beside(prepared: Prepared, traffic: Traffic) -> frozenset[int]:
-    """Obstacles whose margin the ego starts in, which then does not count."""
-    import shapely
+class _Taken:
+    """What the traffic takes, and what is no road."""
 
-    start, vehicle = prepared.scene.initial_state, prepared.scene.vehicle
-    wide = float(prepared.config.checker.clearance) + _ROUNDING
-    pose = np.array([[start.x, start.y, start.orientation]])
-    ego = outlines(pose, vehicle.half_length + wide, vehicle.half_width + wide)[0]
-    found = set()
-    for body in traffic.bodies:
-        there = _at(body, 0.0, prepared.scene.dt)
-        if there is not None and shapely.intersects(ego, there):
-            found.add(body.id)
-    return frozenset(found)
+    def __init__(self, prepared: Prepared, scenario: Any, traffic: Traffic) -> None:
+        self.prepared, self.scenario, self.traffic = prepared, scenario, traffic
+        self.dt = prepared.scene.dt
 
+    @cached_property
+    def road(self) -> Any:
+        """The road, laid out anew; None where it does not count."""
+        checker = self.prepared.config.checker
+        return road_of(self.scenario, float(checker.road_gap)) if checker.road else None
 
-def _occupied(
-    one: Mapping[str, Any], time: float, start: Sequence[float], prepared: Prepared, traffic: Traffic,
-    beside: frozenset[int],
-) -> None:  # fmt: skip
-    """A shape has to be inside of what the obstacle takes at its time."""
-    import shapely
+    @cached_property
+    def beside(self) -> frozenset[int]:
+        """Obstacles whose margin the ego starts in, which then does not count."""
+        import shapely
 
-    obstacle = int(one["obstacle"])
-    if obstacle in beside:
-        raise Wrong(f"the margin of obstacle {obstacle}, in which the ego starts, does not count")
-    shape = shapely.Polygon([(float(x) + start[0], float(y) + start[1]) for x, y in one["shape"]])
-    for body in traffic.bodies:
-        if body.id == obstacle:
-            there = _at(body, time, prepared.scene.dt)
-            if there is not None and shapely.covers(there.buffer(_ROUNDING), shape):
-                return
-    raise Wrong(f"obstacle {obstacle} is not where it says at {time:.3f} s")
+        start, vehicle = self.prepared.scene.initial_state, self.prepared.scene.vehicle
+        wide = float(self.prepared.config.checker.clearance) + _ROUNDING
+        pose = np.array([[start.x, start.y, start.orientation]])
+        ego = outlines(pose, vehicle.half_length + wide, vehicle.half_width + wide)[0]
+        there = ((body.id, _at(body, 0.0, self.dt)) for body in self.traffic.bodies)
+        return frozenset(i for i, shape in there if shape is not None and shapely.intersects(ego, shape))
+
+    def require(self, kind: str, one: Mapping[str, Any], time: float, start: Sequence[float]) -> None:
+        """A shape has to be inside of what is taken at its time.
+
+        Raises
+        ------
+        Wrong
+            Otherwise.
+        """
+        import shapely
+
+        obstacle = int(one["obstacle"])
+        shape = shapely.Polygon([(float(x) + start[0], float(y) + start[1]) for x, y in one["shape"]])
+        if obstacle == _NO_ROAD:
+            # the margin around the body does not count at the edge, and reaches farthest at its corners
+            margin = math.sqrt(2.0) * self.prepared.config.checker.clearance if kind == "search" else 0.0
+            if self.road is None or not shapely.distance(self.road, shape) > margin:
+                raise Wrong("what is said to be no road is some, or too near to it")
+            return
+        if kind == "search" and obstacle in self.beside:
+            raise Wrong(f"the margin of obstacle {obstacle}, in which the ego starts, does not count")
+        for body in self.traffic.bodies:
+            if body.id == obstacle:
+                there = _at(body, time, self.dt)
+                if there is not None and shapely.covers(there.buffer(_ROUNDING), shape):
+                    return
+        raise Wrong(f"obstacle {obstacle} is not where it says at {time:.3f} s")
 
 
 def _at(body: Body, time: float, dt: float) -> Any:
