@@ -1,9 +1,9 @@
 """The bound on the time to react over a folder: how tight, how fast, and whether anything contradicts it.
 
-``python -m benchmarks.bound DIR [--scan] [--shoot]`` prints one line per conflict and a summary. Each proof is
-checked by the certificate's own code. ``--scan`` repairs at every point of the grid of 0.1 s with all backends
-and counts verified repairs at or after a bound; ``--shoot`` searches for motions there by direct shooting, and
-for the latest motion before it.
+``python -m benchmarks.bound DIR [--scan] [--shoot]`` prints one line per conflict and a summary. Each proof
+is checked by the certificate's own code. ``--scan`` repairs at every point of the grid of 0.1 s with all
+backends and counts verified repairs at or after a bound; ``--shoot`` searches for motions there by direct
+shooting, and for the latest motion before it.
 """
 
 from __future__ import annotations
@@ -118,18 +118,20 @@ def summary(cases: list[dict], seconds: float) -> list[str]:
         spent = np.array([late.seconds for late in lates])
         below = np.mean([late.proven for late in lates])
         gain = np.mean([case["ttc"] - min(case["ttc"], case["bounds"][kind].time) for case in cases])
+        text.append(f"{kind}: proven before the TTC in {100 * below:.0f} %, by {gain:.3f} s on average")
         text.append(
-            f"{kind}: proven before the TTC in {100 * below:.0f} %, by {gain:.3f} s on average; "
-            f"processor time median {np.median(spent):.3f}, 90 % {np.quantile(spent, 0.9):.3f}, largest {spent.max():.3f} s"
+            f"  processor time: median {np.median(spent):.3f}, 90 % {np.quantile(spent, 0.9):.3f}, "
+            f"largest {spent.max():.3f} s"
         )
         if "shot" in cases[0]:
             shots = [
                 (case["bounds"][kind].time, *case["shot"][kind]) for case in cases if kind in case["shot"]
             ]
             near = [t - latest for t, _, _, latest in shots if not math.isnan(latest)]
+            tried, free = sum(s[1] for s in shots), sum(s[2] for s in shots)
+            text.append(f"  {tried} motions at and after it by shooting: {free} meet nothing")
             text.append(
-                f"  {sum(s[1] for s in shots)} motions at and after it by shooting: {sum(s[2] for s in shots)} "
-                f"meet nothing; the latest before it that does: {np.median(near):.3f} s earlier (median)"
+                f"  the latest before it that meets nothing: {np.median(near):.3f} s earlier (median)"
             )
     proofs = [ok for case in cases for ok in case["certified"]]
     text.append(f"{sum(proofs)} of {len(proofs)} proofs pass the certificate")
