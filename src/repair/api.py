@@ -23,6 +23,7 @@ from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
 from repair.io.destination import require_folder
 from repair.metrics.base import Asked, MetricValue
 from repair.metrics.registry import measure
+from repair.onward.plan import Onward
 from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
 from repair.outcome.driven import driven_curve, what_is_driven
@@ -73,6 +74,8 @@ class RepairResult:
     terminal : Terminal or None
         How the repair ends: the stop that follows it, and how safe that is; None without a repair, and with
         ``checker.terminal: off``.
+    onward : Onward or None
+        What is driven after the evasive part (``repair.goal``, ``repair.rejoin``); None where nobody asked.
     """
 
     prepared: Prepared
@@ -85,6 +88,7 @@ class RepairResult:
     modes: tuple[ModeResult, ...] = ()
     bounds: dict[str, Bound] = field(default_factory=dict)
     terminal: Terminal | None = None
+    onward: Onward | None = None
 
     def __repr__(self) -> str:
         return "\n".join(f"{name:9} {text}" for name, text in headline(self.to_dict()))
@@ -116,7 +120,7 @@ class RepairResult:
     @property
     def curve(self) -> Curve:
         """What is driven then, in the Frenet frame; the reference where there is no repair."""
-        return driven_curve(self.prepared, self.search)
+        return driven_curve(self.prepared, self.search, self.onward)
 
     @property
     def trajectory(self) -> Any:
@@ -128,7 +132,7 @@ class RepairResult:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
             self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
-            self.modes, self.bounds, self.terminal,
+            self.modes, self.bounds, self.terminal, self.onward,
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
@@ -282,7 +286,7 @@ def search(
     can = replace(backend.capabilities, helper=None)  # results are data
     return RepairResult(
         prepared, found, driven.states, driven.peaks, timed.seconds, metrics, can, modes, bounds,
-        driven.terminal,
+        driven.terminal, driven.onward,
     )  # fmt: skip
 
 

@@ -10,12 +10,14 @@ from repair.arrays import Array, in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
+from repair.onward.plan import Onward, back_to_reference, to_the_goal
 from repair.problem.factory import ProblemFactory, Unguided
 from repair.problem.limits import Limits
 from repair.problem.settings import RepairConfig
 from repair.terminal.judge import EndJudge
 from repair.terminal.required import SafeEnds
 from repair.terminal.verdict import Terminal
+from repair.timegrid import on_grid
 from repair.world.boxes import Occupancy
 from repair.world.dead_ends import dead_ends, with_boxes
 
@@ -103,6 +105,26 @@ class Situation:
         if self.checker.config.terminal == "require":
             return SafeEnds(self.checker, self.ends)
         return self.checker
+
+    def onward(self, found: Curve | None, t_rep: float) -> Onward | None:
+        """What is driven after the evasive part, or the reference; None where nobody asks.
+
+        Parameters
+        ----------
+        found : Curve or None
+            The repair.
+        t_rep : float
+            From when on it is driven [s].
+        """
+        driven = self.reference if found is None else SplicedCurve(self.reference, found, t_rep)
+        t_end = self.t_reference if found is None else self.t_end
+        if self.settings.goal:
+            made = to_the_goal(self.ends, driven, t_rep, on_grid(t_end, self.scene.dt))
+            if made.reached or not self.settings.rejoin or found is None:
+                return made
+        if self.settings.rejoin and found is not None:
+            return back_to_reference(self.ends, driven, self.reference, self.t_end, self.t_reference)
+        return None
 
     def ending(self, repaired: Curve, t_rep: float) -> Terminal | None:
         """How a repair ends; None with ``checker.terminal: off``."""

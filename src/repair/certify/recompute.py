@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +38,8 @@ from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import read_curve
 from repair.errors import RepairError
 from repair.io.result_json import read_record
+from repair.onward.leg import Leg, leg_from_dict
+from repair.terminal.traffic import traffic_until
 from repair.timegrid import steps_until
 
 if TYPE_CHECKING:
@@ -89,7 +91,9 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     t_rep = 0.0 if curve is None else float(content["f_ttr_s"])
     t_end = prepared.t_reference if curve is None else prepared.t_end
     driven: Curve = prepared.reference if curve is None else SplicedCurve(prepared.reference, curve, t_rep)
-    t_end = steps_until(t_end, dt) * dt
+    t_repaired = t_end = steps_until(t_end, dt) * dt
+    if (leg := _leg(content)) is not None:
+        driven, t_end = SplicedCurve(driven, leg, leg.t_start), steps_until(leg.t_end, dt) * dt
     if not 0.0 <= t_rep < t_end:
         raise RepairError(
             f"the repair in {folder} begins at {t_rep:g} s, and what it is for ends at {t_end:g} s"
@@ -97,7 +101,9 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     planned = along_curve(driven, scene.frame, scene.vehicle, t_end, dt, float(states.orientation[0]))
     written = through_states(states, first, dt, scene.vehicle)
     ways = planned, written
-    traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
+    n_steps = max(scene.n_steps, steps_until(t_end, dt))
+    longer = scene if n_steps == scene.n_steps else replace(scene, obstacles=traffic_until(scene, n_steps))
+    traffic = read_traffic(anew.scenario, problem, longer, prepared.config, n_steps)
 
     rows: list[CertificateRow] = []
     if curve is not None:
@@ -105,7 +111,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
         rows += seam_rows(prepared.reference, curve, t_rep, jumps=bool(said.get("jumps", False)))
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
         allowed, margin = boxes_kept(content), prepared.config.checker.margin
-        rows += clearance_rows(curve, prepared.occupancy, dt, t_end, allowed, margin)
+        rows += clearance_rows(curve, prepared.occupancy, dt, t_repaired, allowed, margin)
     judged = prepared.checker.reference_limits if curve is None else prepared.limits
     rows += driven_rows(planned, judged, reference=curve is None)
     rows += physical_rows(states, dt, scene.vehicle)
@@ -119,7 +125,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows += _record_rows(content, prepared, curve, states, traffic)
     rows += late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)
-    rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap)
+    rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap, goal=_claims_goal(content))
     return Certificate(
         folder,
         str(content.get("scenario")),
@@ -152,6 +158,17 @@ def _reference(content: Mapping[str, Any], prepared: Prepared) -> Motion:
     until = steps_until(prepared.t_reference, scene.dt) * scene.dt
     start = float(content["trajectory"]["orientation_rad"][0])
     return along_curve(prepared.reference, scene.frame, scene.vehicle, until, scene.dt, start)
+
+
+def _leg(content: Mapping[str, Any]) -> Leg | None:
+    """What is driven after the evasive part."""
+    leg = (content.get("onward") or {}).get("leg")
+    return None if leg is None else leg_from_dict(leg)
+
+
+def _claims_goal(content: Mapping[str, Any]) -> bool:
+    onward = content.get("onward") or {}
+    return onward.get("kind") == "goal" and bool(onward.get("reached"))
 
 
 # -- reading -----------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ _FREE = frozenset(
 #: What follows from the scenario, the configuration and the curve alone.
 _DIRECT = (
     "schema", "scenario", "backend", "ttc_s", "contact_ttc_s", "conflict", "reference", "t_end_s", "limits",
-    "notes", "trajectory", "terminal", "peak_deceleration_mps2", "peak_acceleration_mps2",
+    "notes", "trajectory", "terminal", "onward", "peak_deceleration_mps2", "peak_acceleration_mps2",
     "peak_lateral_acceleration_mps2", "peak_total_acceleration_mps2", "min_speed_mps", "max_speed_mps",
 )  # fmt: skip
 _EXACT, _SOLVED = 1e-6, 1e-4  # a solver on another machine ends a little elsewhere
@@ -118,7 +118,15 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
     driven = what_is_driven(prepared, found)
     metrics = measure(wanted, asked) if wanted else {}
     return record_of(
-        prepared, found, driven.states, driven.peaks, {}, metrics, capabilities, terminal=driven.terminal
+        prepared,
+        found,
+        driven.states,
+        driven.peaks,
+        {},
+        metrics,
+        capabilities,
+        terminal=driven.terminal,
+        onward=driven.onward,
     )
 
 

@@ -37,7 +37,8 @@ def met_beyond(scene: Scene, states: DrivenStates, margin: float) -> Beyond | No
     margin : float
         By how much the ego is enlarged on every side [m].
     """
-    last_step = len(states.x) - 1
+    count = min(len(states.x), scene.n_steps + 1)  # what is driven may go on beyond the scene's horizon
+    last_step = count - 1
     ends = [_last(obstacle) for obstacle in scene.obstacles]
     moved = [
         _moved_on(obstacle, last, scene.dt)
@@ -47,7 +48,9 @@ def met_beyond(scene: Scene, states: DrivenStates, margin: float) -> Beyond | No
     if not moved:
         return None
     world = CollisionWorld(moved, scene.vehicle, scene.dt, scene.n_steps, 1)
-    contact = world.contact_along(states.x + 1j * states.y, states.orientation, margin=margin)
+    contact = world.contact_along(
+        (states.x + 1j * states.y)[:count], states.orientation[:count], margin=margin
+    )
     if contact is None:
         return None
     end = min(

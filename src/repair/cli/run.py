@@ -35,6 +35,9 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bound", action="store_true", help="prove from when on nothing avoids the conflict any more"
     )
+    parser.add_argument(
+        "--to-goal", action="store_true", help="go on until the planning problem's goal is reached"
+    )
     parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
 
 
@@ -43,6 +46,8 @@ def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
     """The scenario's file and the configuration; the paper's scenarios come with their presets."""
     if arguments.bound:
         arguments.overrides = [*arguments.overrides, "bound.wanted=true"]
+    if arguments.to_goal:
+        arguments.overrides = [*arguments.overrides, "repair.goal=true"]
     config = resolve(arguments)
     name = arguments.scenario or config.scenario
     default = arguments.preset if arguments.preset in PAPER_SCENARIOS else PAPER_SCENARIOS[0]

@@ -157,6 +157,7 @@ _OTHERS: dict[str, Test] = {
     "checks_off": _list_of(_text),
     "checked_until_s": _maybe(_number),
     "prediction_end": _maybe(_table_of(_number)),
+    "onward": _maybe(_all_of({"kind": _text, "reached": _flag, "sentence": _text, "tried": _whole})),
     "terminal": _maybe(_all_of(_TERMINAL)),
     "limits": _table_of(_maybe(_number)),
     "versions": lambda value: isinstance(value, dict),

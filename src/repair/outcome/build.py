@@ -8,6 +8,7 @@ from repair.backend.base import Capabilities
 from repair.bounds.latest import Bound
 from repair.check.peaks import Peaks
 from repair.metrics.base import MetricValue
+from repair.onward.plan import Onward
 from repair.outcome.data import Outcome
 from repair.outcome.draw import drawing_of
 from repair.outcome.record import record_of
@@ -31,7 +32,10 @@ def outcome_of(
     modes: Sequence[ModeResult] = (),
     bounds: Mapping[str, Bound] | None = None,
     terminal: Terminal | None = None,
+    onward: Onward | None = None,
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
-    record = record_of(prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal)
-    return Outcome(record, drawing_of(prepared, found, states, terminal))
+    record = record_of(
+        prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal, onward
+    )
+    return Outcome(record, drawing_of(prepared, found, states, terminal, onward))

@@ -19,7 +19,7 @@ class Line:
     ----------
     kind : str
         ``reference``; ``repair``, of a visited time-to-repair; ``stage``, on the way to it; ``continuation``,
-        the stop after the repair.
+        the stop after the repair; ``onward``, what is driven after it.
     name : str
         Of the stage; of a continuation how safe that end is; else empty.
     t_rep : float or None

@@ -6,6 +6,7 @@ import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.curves.base import Curve, SplicedCurve
+from repair.onward.plan import Onward
 from repair.outcome.data import Body, Box, Drawing, Line
 from repair.preparation import Prepared
 from repair.scene.traffic.obstacle import Obstacle
@@ -22,7 +23,11 @@ _STAYS = 0.5  # who moves less than this in all stands [m]
 
 
 def drawing_of(
-    prepared: Prepared, found: SearchResult, states: DrivenStates, terminal: Terminal | None = None
+    prepared: Prepared,
+    found: SearchResult,
+    states: DrivenStates,
+    terminal: Terminal | None = None,
+    onward: Onward | None = None,
 ) -> Drawing:
     """Lines, boxes, road and traffic of a result.
 
@@ -34,6 +39,8 @@ def drawing_of(
         What is driven, at the scenario's steps.
     terminal : Terminal or None
         How the repair ends.
+    onward : Onward or None
+        What is driven after the evasive part.
     """
     scene, dt = prepared.scene, prepared.scene.dt
     until = prepared.t_end if found.probes else prepared.t_reference
@@ -41,7 +48,7 @@ def drawing_of(
     moment, end = round(at / dt), round(until / dt)
     # The conflict first: where labels would cover each other, the earlier one stays.
     steps = tuple(dict.fromkeys([moment, 0, end, moment // 2]))
-    lines = (*_lines(prepared, found, until), *_continuation(prepared, terminal))
+    lines = (*_lines(prepared, found, until), *_after(prepared, terminal, onward))
     driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
     seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])
     # A figure is at least as high as a fifth of its width, and shows that much road.
@@ -98,16 +105,21 @@ def _line(prepared: Prepared, curve: Curve, t_rep: float | None, kind: str, name
     return Line(kind, name, t_rep, *(_rounded(column[k]) for column in columns))
 
 
-def _continuation(prepared: Prepared, terminal: Terminal | None) -> tuple[Line, ...]:
-    """The stop after the repair, at the scenario's steps."""
-    if terminal is None or terminal.continuation is None:
-        return ()
-    stop = terminal.continuation.stop
-    count = round((stop.t_end - stop.t_start) / prepared.scene.dt) * prepared.config.checker.substeps
-    samples = stop.sample(np.linspace(stop.t_start, stop.t_end, count + 1))
-    path = prepared.scene.frame.cartesian(samples)
-    columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
-    return (Line("continuation", terminal.ending.value, None, *(_rounded(column) for column in columns)),)
+def _after(prepared: Prepared, terminal: Terminal | None, onward: Onward | None) -> tuple[Line, ...]:
+    """The stop after the repair, and what is driven after it, as densely as the others."""
+    curves: list[tuple[str, str, Curve]] = []
+    if terminal is not None and terminal.continuation is not None:
+        curves.append(("continuation", terminal.ending.value, terminal.continuation.stop))
+    if onward is not None and onward.leg is not None:
+        curves.append(("onward", onward.kind, onward.leg))
+    lines = []
+    for kind, name, curve in curves:
+        count = round((curve.t_end - curve.t_start) / prepared.scene.dt) * prepared.config.checker.substeps
+        samples = curve.sample(np.linspace(curve.t_start, curve.t_end, count + 1))
+        path = prepared.scene.frame.cartesian(samples)
+        columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
+        lines.append(Line(kind, name, None, *(_rounded(column) for column in columns)))
+    return tuple(lines)
 
 
 def _boxes(prepared: Prepared, t_end: float) -> tuple[Box, ...]:

@@ -16,9 +16,11 @@ from repair.check.peaks import Peaks
 from repair.curves.base import SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
+from repair.onward.plan import Onward
 from repair.outcome.bound_record import bound_to_dict
 from repair.outcome.driven import driven_curve
 from repair.outcome.ending import columns_of, detail_of, place_of, terminal_to_dict
+from repair.outcome.onward_record import onward_to_dict
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
@@ -47,6 +49,7 @@ def record_of(
     modes: Sequence[ModeResult] = (),
     bounds: Mapping[str, Bound] | None = None,
     terminal: Terminal | None = None,
+    onward: Onward | None = None,
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -70,6 +73,8 @@ def record_of(
         From when on it is proven too late, by kind.
     terminal : Terminal or None
         How the repair ends.
+    onward : Onward or None
+        What is driven after the evasive part.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -109,11 +114,12 @@ def record_of(
         **peaks_to_dict(peaks),
         "probes": [_probe(prepared, p) for p in found.probes],
         "terminal": terminal_to_dict(terminal),
+        "onward": onward_to_dict(onward),
         "curve": curve_to_dict(found.curve),
         "reference": curve_to_dict(prepared.reference, prepared.t_reference),
         "given_reference": None if prepared.given is None else prepared.given.plain,
         "t_end_s": number(prepared.t_end),
-        "trajectory": _trajectory(prepared, found, states),
+        "trajectory": _trajectory(prepared, found, states, onward),
         "limits": _limits(prepared.limits),
         "capabilities": {name: can for name, can in asdict(capabilities).items() if name != "helper"},
         "notes": [*prepared.notes, *filter(None, [one_point(prepared, found)])],
@@ -202,12 +208,14 @@ def _metric(metric: MetricValue) -> dict[str, Any]:
     return {f"value_{metric.unit}": number(metric.value), "status": metric.status}
 
 
-def _trajectory(prepared: Prepared, found: SearchResult, states: DrivenStates) -> dict[str, Any]:
+def _trajectory(
+    prepared: Prepared, found: SearchResult, states: DrivenStates, onward: Onward | None
+) -> dict[str, Any]:
     """What is driven, at the scenario's steps; centre of the vehicle, speed at the rear axle."""
     return {
         "initial_time_step": prepared.scene.initial_time_step,
         "dt_s": number(prepared.scene.dt),
-        **columns_of(states, driven_curve(prepared, found)),
+        **columns_of(states, driven_curve(prepared, found, onward)),
     }
 
 

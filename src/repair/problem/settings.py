@@ -83,5 +83,7 @@ class RepairConfig:
         "where the path leaves the road, at its end above all, repairs stop or go around as for an obstacle",
         only_with=("checker.road", (True,)),
     )
+    rejoin: bool = setting(False, "after the evasive part, drive back to the reference where there is room")
+    goal: bool = setting(False, "go on until the planning problem's goal is reached")
     degree: int = setting(3, "of the B-spline", low=3, high=5)
     spacing: float = setting(0.2, "knot spacing [s]", low=0.02, high=5.0)

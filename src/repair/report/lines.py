@@ -99,15 +99,17 @@ def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) ->
 
 
 def continuation_lines(outcome: Outcome) -> list[Styled]:
-    """The stop after the repair, dash-dotted; red where it fails."""
-    return [
-        Styled(
-            line, f"stop after it,\n{line.name.replace('_', ' ')}",
-            {"color": OBSTACLE if line.name == "unsafe" else EGO, "lw": 1.4, "ls": "-."},
-        )
-        for line in drawing_in(outcome).lines
-        if line.kind == "continuation"
-    ]  # fmt: skip
+    """The stop after the repair, dash-dotted, red where it fails; and what is driven after it."""
+    found = []
+    for line in drawing_in(outcome).lines:
+        if line.kind == "continuation":
+            colour = OBSTACLE if line.name == "unsafe" else EGO
+            label = f"stop after it,\n{line.name.replace('_', ' ')}"
+            found.append(Styled(line, label, {"color": colour, "lw": 1.4, "ls": "-."}))
+        elif line.kind == "onward":
+            label = "on to the goal" if line.name == "goal" else "back to the\nreference"
+            found.append(Styled(line, label, {"color": "#009E73", "lw": 1.8}))
+    return found
 
 
 def title_of(outcome: Outcome) -> str:

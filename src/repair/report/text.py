@@ -68,6 +68,8 @@ def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[s
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))
+    if content.get("onward"):
+        rows.append(("Onward", content["onward"]["sentence"]))
     if content.get("terminal"):
         rows.append(("After it", _after(content["terminal"])))
     if content.get("metrics"):  # results of earlier versions have none

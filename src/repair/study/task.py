@@ -81,6 +81,8 @@ def _row(
         **{f"{name}_time_s": round(result.phases[name], 5) for name in ("search", "solve", "check")},
     )
     row.update(_ending(content["terminal"]))
+    if (onward := content["onward"]) is not None:
+        row.update(onward=onward["kind"], onward_reached=onward["reached"], onward_detail=onward["sentence"])
     if settings.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row.update(_official(result))
     if settings.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):

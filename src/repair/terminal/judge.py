@@ -22,6 +22,7 @@ from repair.timegrid import INSTANT, steps_until
 if TYPE_CHECKING:
     from repair.problem.factory import ProblemFactory
     from repair.scene.traffic.obstacle import Obstacle
+    from repair.vehicle.states import DrivenStates
 
 __all__ = ["EXTENSIONS", "EndJudge"]
 
@@ -104,6 +105,17 @@ class EndJudge:
         trial, verdict = first
         return Terminal(Ending.UNSAFE, self._driven(driven, trial, t_end), {}, verdict.violations, tried)
 
+    def passes(self, driven: Curve, leg: Curve, leaves: float) -> bool:
+        """Whether the checker accepts a leg that leaves what is driven at a time [s], until the leg's end."""
+        since = _last_moving(driven, leaves, self.checker.scene.dt)
+        whole = leg if since == leaves else SplicedCurve(driven, leg, leaves)
+        return self._until(leg.t_end).known.check(self._problem(driven, since, leg.t_end), whole).ok
+
+    def drive(self, driven: Curve, t_end: float) -> DrivenStates:
+        """The vehicle along a curve until a time [s], also beyond the scene's horizon; at its steps."""
+        judge = self._until(t_end).known
+        return judge.drive(driven, t_end).every(judge.config.substeps)
+
     def _problem(self, driven: Curve, since: float, stops: float) -> RepairProblem:
         """To follow what is driven until a time [s], and to be judged from there on."""
         return replace(self.source, reference=driven, t_end=stops).plain(since)
@@ -130,9 +142,7 @@ class EndJudge:
 
     def _driven(self, driven: Curve, trial: Trial, t_end: float) -> Continuation:
         """The vehicle at the scenario's steps from the last state of the repair on."""
-        judge = self._until(trial.stop.t_end).known
-        whole = judge.drive(SplicedCurve(driven, trial.stop, t_end), trial.stop.t_end)
-        states = whole.every(judge.config.substeps)
+        states = self.drive(SplicedCurve(driven, trial.stop, t_end), trial.stop.t_end)
         return Continuation(trial.maneuver, trial.stop, states.since(t_end - INSTANT))
 
 
