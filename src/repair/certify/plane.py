@@ -11,6 +11,7 @@ from repair.certify.certificate import CertificateRow, at_most, said
 from repair.certify.contact import Meeting, first_meeting, outlines
 from repair.certify.motion import Motion
 from repair.certify.traffic import Traffic
+from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
     from repair.preparation import Prepared
@@ -70,8 +71,11 @@ def contact_rows(
 
 
 def _free(name: str, met: Meeting, t_end: float, more: str = "") -> CertificateRow:
-    """A row of when something is met, which has to be never."""
-    if met.time < np.inf:
+    """A row of when something is met, which has to be never before the end.
+
+    At the very end a set that holds from there on begins, and what comes then is not what was asked.
+    """
+    if met.time < t_end - INSTANT:
         return CertificateRow(name, met.time, t_end, met.time - t_end, False, "continuous", _unit(met))
     return CertificateRow(name, t_end, t_end, 0.0, True, "continuous", f"s{more}")
 

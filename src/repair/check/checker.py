@@ -15,7 +15,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.limits import Excess, curve_excess, plane_excess, speed_excess, surely_kept
+from repair.check.limits import Excess, curve_excess, plane_excess, speed_excess, surely_kept, vehicle_excess
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Checker"]
 
+_TURNED = 0.01  # a repair may begin turned off the reference by this [rad]
+
 
 @dataclass(frozen=True)
 class _Followed:
@@ -43,6 +45,7 @@ class _Followed:
     t_end: float
     motion: Array
     slip: Array
+    heading: float
 
 
 class Checker:
@@ -130,8 +133,20 @@ class Checker:
             found += boxes_entered(problem, curve, after, self.times(problem.t_end), self.config.substeps)
         found += self._clear(path, s, orientation, first, problem.t_rep)
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
+        if self.config.limits and not found:
+            at = slice(None, None, self.config.substeps)
+            found += _as_violation(vehicle_excess(path.t[at], path.speed[at], slip[at], self.scene.vehicle))
+        if not first and not found and problem.t_rep < INSTANT:
+            found += self._turned_at_start(problem, float(orientation[0]))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
+
+    def _turned_at_start(self, problem: RepairProblem, orientation: float) -> list[Violation]:
+        """A repair that begins at once has to begin with the body as it stands, like the reference."""
+        kept = self._kept(problem.reference, problem.t_end)
+        turned = abs(float(wrap(orientation - kept.heading + float(kept.slip[0]))))
+        words = f"begins turned by {turned:.3f} rad"
+        return [Violation(Reason.KINEMATICS, 0.0, words)] if turned > _TURNED else []
 
     def take_word(self, refused: float, limits: Limits) -> None:
         """Leave the kinematics of references to CommonRoad's drivability checker, which was asked.
@@ -168,7 +183,7 @@ class Checker:
         motion = _motion(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
         slip, orientation = self.scene.model.angles(path, self._standing(path))
-        self._followed = _Followed(reference, t_end, motion, slip)
+        self._followed = _Followed(reference, t_end, motion, slip, float(path.heading[0]))
         return path, motion[0], slip, orientation
 
     def _kept(self, reference: Curve, t_end: float) -> _Followed:

@@ -32,6 +32,7 @@ __all__ = [
     "plane_excess",
     "speed_excess",
     "surely_kept",
+    "vehicle_excess",
 ]
 
 #: By how much rounding may move a number that is on its limit; the certificate reads curves to 1e-12.
@@ -173,6 +174,38 @@ def plane_excess(
         rows = _against(samples, frame, limits, vehicle, tolerance)
     return [
         Excess(float(samples.t[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
+        for value, most, text in rows
+        if not float(value.max()) <= most + ROUNDING
+    ]
+
+
+def vehicle_excess(t: Array, speed: Array, slip: Array, vehicle: Vehicle) -> list[Excess]:
+    """What the states at the scenario's steps ask of the vehicle beyond its own parameters.
+
+    The limits of a repair bind the middle of the vehicle along the curve; CommonRoad's model drives by the
+    rear axle from step to step, and asks a little more of tyres and engine in a bend, and of the steering at
+    walking pace. Its drivability checker allows that within its tolerances. Here it is held to the letter.
+
+    Parameters
+    ----------
+    t, speed, slip : (K,) array
+        At the scenario's steps: time [s], speed of the centre [m/s], slip angle at the centre [rad].
+    """
+    if len(t) < 2:
+        return []
+    turn = np.tan(slip)
+    axle, curvature = speed * np.cos(slip), turn / vehicle.rear
+    along = (axle[1:] - axle[:-1]) / (t[1] - t[0])
+    grip = np.hypot(along, (axle[:-1] ** 2) * curvature[:-1])
+    steering = np.abs(np.arctan(vehicle.wheelbase * curvature))
+    engine = along - vehicle.engine_acceleration(np.minimum(axle[1:], axle[:-1]))
+    rows = (
+        (grip, vehicle.a_max, "grip {:.2f} m/s² of {:.2f} from step to step"),
+        (engine, 0.0, "{:.2f} m/s² more from step to step than the engine gives"),
+        (steering, vehicle.steering_max, "steering angle {:.2f} rad of {:.2f}"),
+    )
+    return [
+        Excess(float(t[int(np.argmax(value > most + ROUNDING))]), text.format(float(value.max()), most))
         for value, most, text in rows
         if not float(value.max()) <= most + ROUNDING
     ]

@@ -122,7 +122,10 @@ def record_of(
         "trajectory": _trajectory(prepared, found, states, onward),
         "limits": _limits(prepared.limits),
         "capabilities": {name: can for name, can in asdict(capabilities).items() if name != "helper"},
-        "notes": [*prepared.notes, *filter(None, [one_point(prepared, found)])],
+        "notes": [
+            *prepared.notes,
+            *filter(None, [one_point(prepared, found), _over_a_gap(prepared, found, states)]),
+        ],
         "solution_file": None,
         "figure_files": [],
         "scenario_file": None,
@@ -202,6 +205,14 @@ def _mode(mode: ModeResult) -> dict[str, Any]:
         "ttc_s": number(mode.ttc),
         "f_ttr_s": number(mode.f_ttr),
     }
+
+
+def _over_a_gap(prepared: Prepared, found: SearchResult, states: DrivenStates) -> str:
+    """Where what is driven crosses a gap of the map that CommonRoad's own boundary check has not as road."""
+    road = prepared.checker.road
+    if road is None or found.status not in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
+        return ""
+    return road.over_a_gap(states.x, states.y, states.orientation)
 
 
 def _metric(metric: MetricValue) -> dict[str, Any]:

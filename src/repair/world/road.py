@@ -74,6 +74,23 @@ class RoadBoundary:
         self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
 
+    def over_a_gap(self, x: Array, y: Array, orientation: Array) -> str:
+        """Where poses (K,) first cross what counts as road and is drawn by nobody, in words; or nothing."""
+        import shapely
+
+        if self.region is self._drawn or not len(x):
+            return ""
+        bodies = shapely.polygons(self.outline(x, y, orientation))
+        for body in bodies[~shapely.covers(self._drawn, bodies)]:
+            part = shapely.difference(body, self._drawn)
+            if (area := float(shapely.area(part))) > _SLIVER:
+                at = shapely.centroid(part)
+                return (
+                    f"the way crosses a gap of the map at ({at.x:.1f}, {at.y:.1f}), {area:.3f} m² under the "
+                    "ego, which counts as road (checker.road_gap) and not for CommonRoad's own boundary check"
+                )
+        return ""
+
     def bridged(self, near: Any = None) -> list[Bridge]:
         """The gaps and holes of the map that count as road.
 
@@ -262,7 +279,11 @@ def _outlines(network: Any) -> list[Any]:
         if not section.is_valid:
             lanes = [lanelets[member] for member in members]
             rings = [np.concatenate([x.left_vertices, x.right_vertices[::-1]])[:, :2] for x in lanes]
-            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 2]
+            # One whose left bound lies on its right is no lanelet: the drivability checker has no road there.
+            proper = [
+                ring for ring in rings if len(ring) > 2 and not shapely.is_ccw(shapely.LinearRing(ring))
+            ]
+            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in proper]
     return found
 
 
