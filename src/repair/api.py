@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.backend.base import Capabilities, RepairBackend
-from repair.backend.guard import Guarded
 from repair.baselines.evasive.at_ttr import AtTtr
 from repair.bounds.latest import Bound, bound
 from repair.check.peaks import Peaks
@@ -35,7 +34,7 @@ from repair.scene.commonroad import load_scene, with_traffic
 from repair.scene.scene import Scene
 from repair.search.modes import ModeResult, each_mode
 from repair.search.result import Probe, SearchResult, SearchStatus
-from repair.search.search import search_f_ttr
+from repair.search.several import capabilities_of, search_with
 from repair.solvers.registry import make_backend
 from repair.terminal.verdict import Terminal
 from repair.vehicle.commonroad_ks import load_official
@@ -68,7 +67,7 @@ class RepairResult:
     modes : tuple of ModeResult
         What each mode alone would allow, of obstacles that were given several predictions.
     capabilities : Capabilities
-        Of the backend.
+        Of the backend, or of the one of several whose repair it is.
     bounds : dict
         From when on it is proven too late, by kind; empty where it was not asked for (``bound.wanted``).
     terminal : Terminal or None
@@ -283,10 +282,9 @@ def search(
     if config.bound.wanted:
         with timed("bound"):
             bounds = bound(prepared, config.bound)
-    can = replace(backend.capabilities, helper=None)  # results are data
     return RepairResult(
-        prepared, found, driven.states, driven.peaks, timed.seconds, metrics, can, modes, bounds,
-        driven.terminal, driven.onward,
+        prepared, found, driven.states, driven.peaks, timed.seconds, metrics,
+        capabilities_of(backend, found), modes, bounds, driven.terminal, driven.onward,
     )  # fmt: skip
 
 
@@ -317,12 +315,11 @@ def find(
     limit = settings.time_limit
     if limit is not None:  # once in the life of a process, and no search's fault
         load_official()
-    backend = Guarded(backend, prepared.config.backend)
+    name = prepared.config.backend
     if prepared.config.driver != "at_ttr":
-        own_way = backend.capabilities.own_way
-        return search_f_ttr(
-            prepared.unguided if own_way else prepared.source, prepared.conflict, backend, prepared.judge,
-            settings, visits=visits, on_probe=on_probe,
+        return search_with(
+            backend, name, prepared, settings,
+            visits=visits, too_late=prepared.too_late, on_probe=on_probe,
         )  # fmt: skip
     begin = time.perf_counter()
     try:
@@ -336,7 +333,6 @@ def find(
         )
     if limit is not None:  # finding the TTR is part of it
         settings = replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 0.0))
-    return search_f_ttr(
-        source, prepared.conflict, backend, prepared.judge, settings,
-        visits=source.visits, on_probe=on_probe,
-    )  # fmt: skip
+    return search_with(
+        backend, name, prepared, settings, around=source, visits=source.visits, on_probe=on_probe
+    )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from repair.arrays import Array
+from repair.bounds.latest import too_late
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
 from repair.check.verdict import Reason
@@ -77,6 +79,13 @@ class Prepared(Situation):
     config: Config
     phases: dict[str, float]
     given: GivenReference | None = None
+
+    @property
+    def too_late(self) -> Callable[[], float] | None:
+        """Asks for the bound, for who asks several backends; None where ``portfolio.bound`` is off."""
+        if not self.config.section("portfolio").bound:
+            return None
+        return partial(too_late, self, self.config.bound)
 
 
 def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:

@@ -69,6 +69,8 @@ class Capabilities:
     helper : callable or None
         Makes the backend that the search asks where this one has found nothing. If the checker accepts a
         curve of that one, this one is asked again, with that curve as guide and ``warm_start``.
+    members : callable or None
+        Makes the backends that it is made of, by name: the search makes a search of each.
     """
 
     relaxes: bool = False
@@ -77,6 +79,7 @@ class Capabilities:
     own_way: bool = False
     jumps: bool = False
     helper: Callable[[], RepairBackend] | None = None
+    members: Callable[[], Mapping[str, RepairBackend]] | None = None
 
 
 @dataclass(frozen=True)
@@ -202,6 +205,8 @@ class BackendSpec:
         One line for people.
     helper : str
         Name of the backend that :attr:`Capabilities.helper` makes; empty for none.
+    members : str
+        Field of its settings that names the backends that :attr:`Capabilities.members` makes; empty for none.
     """
 
     factory: Callable[[Any], RepairBackend] | str
@@ -209,3 +214,4 @@ class BackendSpec:
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
     helper: str = ""
+    members: str = ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from repair.timegrid import steps_until
 if TYPE_CHECKING:
     from repair.situation import Situation
 
-__all__ = ["Bound", "Proof", "bound"]
+__all__ = ["Bound", "Proof", "bound", "too_late"]
 
 _AROUND = 40.0  # where the edge of the road is looked at [m]
 _DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
@@ -112,6 +112,11 @@ def bound(situation: Situation, settings: BoundConfig | None = None) -> dict[str
         return {kind: Bound(kind, math.inf, "no_conflict") for kind in settings.kinds}
     world = _World(situation, settings)
     return {kind: _bound(kind, world, settings) for kind in settings.kinds}
+
+
+def too_late(situation: Situation, settings: BoundConfig) -> float:
+    """From when on the checker calls nothing feasible any more [s]; infinite where that is not proven."""
+    return bound(situation, replace(settings, kinds=["search"]))["search"].time
 
 
 class _World:

@@ -100,7 +100,7 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
     from repair.metrics.registry import measure
     from repair.outcome.driven import what_is_driven
     from repair.outcome.record import record_of
-    from repair.search.search import search_f_ttr
+    from repair.search.several import capabilities_of, search_with
     from repair.solvers.registry import make_backend
 
     config, asked = prepared.config, Asked(prepared, prepared.config.evasive)
@@ -108,13 +108,13 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
     wanted = list(config.metrics) if given is None else []
     if found is None:
         backend = make_backend(config.backend, config)
-        capabilities, at_ttr = backend.capabilities, config.driver == "at_ttr"
+        at_ttr = config.driver == "at_ttr"
         around = AtTtr(prepared.source, asked.evasive) if at_ttr else None
-        free = prepared.unguided if capabilities.own_way else prepared.source
-        found = search_f_ttr(
-            around or free, prepared.conflict, backend, prepared.judge,
-            replace(config.search, time_limit=None), visits=around.visits if around else None,
+        found = search_with(
+            backend, config.backend, prepared, replace(config.search, time_limit=None), around=around,
+            visits=around.visits if around else None, too_late=prepared.too_late,
         )  # fmt: skip
+        capabilities = capabilities_of(backend, found)
         wanted += ["ttr"] if at_ttr and found.complete and "ttr" not in wanted else []
     driven = what_is_driven(prepared, found)
     metrics = measure(wanted, asked) if wanted else {}
@@ -182,9 +182,9 @@ def record_rows(content: Mapping[str, Any], again: Again) -> list[CertificateRow
         told = {key: value for key, value in content.items() if key not in direct}
         rest = list(differences(told, made, _SOLVED))
     elif again.record is not None:  # what had been found when it ended
-        visited = {p["t_rep_s"]: p for p in again.record["probes"]}
+        visited = {(p["t_rep_s"], p["backend"]): p for p in again.record["probes"]}
         for i, probe in enumerate(content.get("probes") or []):
-            same = visited.get(probe.get("t_rep_s"))
+            same = visited.get((probe.get("t_rep_s"), probe.get("backend")))
             if same is not None and probe.get("solver_status") != "time_limit":
                 rest += differences(probe, same, _SOLVED, f"probes[{i}]")
     claim = not again.other

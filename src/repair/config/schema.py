@@ -21,13 +21,13 @@ from repair.scene.settings import SceneConfig
 from repair.search.rules import RULES
 from repair.search.settings import SearchConfig
 from repair.settings import Key, keys_of, require_type, setting
-from repair.solvers.registry import backend_names, sections
+from repair.solvers.registry import BACKENDS, backend_names, sections
 
 __all__ = [
     "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "words_of",
 ]  # fmt: skip
 
-_REGISTRIES: Mapping[str, Registry[Any]] = {r.kind: r for r in (CHECKS, METRICS, RULES, SOURCES)}
+_REGISTRIES: Mapping[str, Registry[Any]] = {r.kind: r for r in (BACKENDS, CHECKS, METRICS, RULES, SOURCES)}
 
 
 @dataclass
@@ -40,7 +40,7 @@ class Config:
         "f_ttr: the search over the time-to-repair; at_ttr: one repair at the TTR (the paper's baseline)",
         choices=("f_ttr", "at_ttr"),
     )
-    backend: str = setting("ego", "ego, casadi, qptr, shooting, or one that is registered")
+    backend: str = setting("ego", "ego, casadi, qptr, shooting, portfolio, or one that is registered")
     metrics: list[str] = setting(
         factory=list, says="metrics of the reference that the result is to hold", registry="metric"
     )

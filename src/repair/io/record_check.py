@@ -89,7 +89,11 @@ _PROBE: dict[str, Test] = {
     "residuals": _table_of(_maybe(_number)),
     **_PEAKS,
 }
-_LATER: dict[str, Test] = {"peak_acceleration_mps2": _maybe(_number), "margin_m": _maybe(_number)}
+_LATER: dict[str, Test] = {
+    "peak_acceleration_mps2": _maybe(_number),
+    "margin_m": _maybe(_number),
+    "backend": _text,
+}
 _TRAJECTORY: dict[str, Test] = {
     "initial_time_step": _whole,
     "dt_s": lambda value: _number(value) and value > 0.0,
@@ -155,6 +159,7 @@ _OTHERS: dict[str, Test] = {
     "scenario_file": _maybe(_text),
     "drawing_file": _maybe(_text),
     "checks_off": _list_of(_text),
+    "repaired_by": _maybe(_text),
     "checked_until_s": _maybe(_number),
     "prediction_end": _maybe(_table_of(_number)),
     "onward": _maybe(_all_of({"kind": _text, "reached": _flag, "sentence": _text, "tried": _whole})),

@@ -107,6 +107,7 @@ def record_of(
             "detail": str(getattr(conflict, "detail", "")),
             "place_m": place_of(conflict.place),
         },
+        "repaired_by": _by(prepared, best) if best is not None else None,
         "bound": bound_to_dict(prepared, found, bounds or {}),
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "modes": [_mode(mode) for mode in modes],
@@ -121,7 +122,7 @@ def record_of(
         "t_end_s": number(prepared.t_end),
         "trajectory": _trajectory(prepared, found, states, onward),
         "limits": _limits(prepared.limits),
-        "capabilities": {name: can for name, can in asdict(capabilities).items() if name != "helper"},
+        "capabilities": _plain(capabilities),
         "notes": [
             *prepared.notes,
             *filter(None, [one_point(prepared, found), _over_a_gap(prepared, found, states)]),
@@ -134,6 +135,10 @@ def record_of(
         "config": prepared.config.to_dict(),
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
     }
+
+
+def _plain(capabilities: Capabilities) -> dict[str, Any]:
+    return {name: can for name, can in asdict(capabilities).items() if name not in ("helper", "members")}
 
 
 def _beyond(beyond: Beyond | None) -> dict[str, Any] | None:
@@ -173,10 +178,16 @@ def probe_peaks(prepared: Prepared, probe: Probe) -> Peaks | None:
     return prepared.checker.peaks(spliced, prepared.t_end, probe.t_rep)
 
 
+def _by(prepared: Prepared, probe: Probe) -> str:
+    """Which backend was asked: that of the configuration, or one of those that it is made of."""
+    return probe.by or prepared.config.backend
+
+
 def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
     solve: SolveResult = probe.solve
     return {
         "t_rep_s": number(probe.t_rep),
+        "backend": _by(prepared, probe),
         "feasible": probe.feasible,
         "reasons": list(probe.verdict.reasons),
         "details": [detail_of(v) for v in probe.verdict.violations],

@@ -116,6 +116,8 @@ def _ttc(content: dict[str, Any]) -> str:
 def _f_ttr(content: dict[str, Any]) -> str:
     if content["f_ttr_s"] is not None:
         how = f", {content['maneuver'].replace('_', ' ')}" if content["maneuver"] else ""
+        if content.get("repaired_by") not in (None, content["backend"]):
+            how += f", found by {content['repaired_by']}"
         return f"{content['f_ttr_s']:.2f} s{how}"
     return "unlimited: there is nothing to react to" if content["status"] == "no_conflict" else "none"
 
@@ -186,8 +188,12 @@ def probe_table(probes: list[dict[str, Any]]) -> list[str]:
                 _milliseconds(p["check_time_s"]),
             )
         )
-    widths = [max(len(row[k]) for row in table) for k in range(len(head))]
-    numbers = {0, 3, 4, 5, 6, 8, 9}
+    if len({p.get("backend") for p in probes}) > 1:
+        names = ["backend", "", *(str(p.get("backend") or "-") for p in probes)]
+        table = [(*row[:1], name, *row[1:]) for row, name in zip(table, names, strict=True)]
+    shift = len(table[0]) - len(head)
+    widths = [max(len(row[k]) for row in table) for k in range(len(head) + shift)]
+    numbers = {0, *(k + shift for k in (3, 4, 5, 6, 8, 9))}
     lines = [
         "  ".join(c.rjust(widths[k]) if k in numbers else c.ljust(widths[k]) for k, c in enumerate(row))
         for row in table

@@ -16,7 +16,10 @@ __all__ = ["Probe", "SearchResult", "SearchStatus"]
 
 @dataclass(frozen=True)
 class Probe:
-    """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said."""
+    """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said.
+
+    Where several backends are asked, ``by`` is the one that was.
+    """
 
     t_rep: float
     solve: SolveResult
@@ -25,6 +28,7 @@ class Probe:
     check_time: float = 0.0
     tried: tuple[str, ...] = ()
     margin: float | None = None
+    by: str = ""
 
     @property
     def feasible(self) -> bool:

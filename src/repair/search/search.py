@@ -20,8 +20,9 @@ from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import other_ways, probe_again, too_close
 from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides, words
 from repair.search.result import Probe, SearchResult, SearchStatus
-from repair.search.rules import Order, probe_order
+from repair.search.rules import IsOpen, Order, probe_order
 from repair.search.settings import SearchConfig
+from repair.timegrid import ROUNDING, on_grid
 
 __all__ = ["iter_probes", "search_f_ttr"]
 
@@ -34,6 +35,7 @@ def iter_probes(
     settings: SearchConfig,
     clock: Callable[[], float] = time.perf_counter,
     visits: Sequence[float] | None = None,
+    after: Probe | None = None,
 ) -> Iterator[Probe]:
     """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
 
@@ -43,6 +45,8 @@ def iter_probes(
         Upper end of the search [s], excluded: the reference is in conflict there.
     visits : sequence of float, optional
         The t_rep to visit [s] instead, whatever comes out.
+    after : Probe, optional
+        A feasible one: later t_rep are visited only, and its curve is where to start from.
     """
     budget = Budget(settings.time_limit, clock(), clock)
     made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
@@ -58,8 +62,10 @@ def iter_probes(
         return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
 
     given = None if visits is None else _given(visits)
-    order = given or probe_order(settings.rule, end, settings.delta_t, is_open)
+    order = given or _order(settings, end, is_open, after)
     warm_start: Curve | None = None
+    if after is not None and backend.capabilities.uses_warm_start:
+        warm_start = after.solve.curve
     answer: bool | None = None
     while True:
         try:
@@ -77,6 +83,31 @@ def iter_probes(
         yield probe
         if budget.cut and not answer:
             raise OutOfTime  # nobody knows whether it would have been feasible
+
+
+def _order(settings: SearchConfig, end: float, is_open: IsOpen, after: Probe | None) -> Order:
+    """The visits of the rule below ``end`` [s]; those after a probe as if the grid began one step later."""
+    rule, step = settings.rule, settings.delta_t
+    if after is None:
+        return probe_order(rule, end, step, is_open)
+    begin = after.t_rep + step
+
+    def at(since: float) -> float:
+        near = on_grid(begin + since, step)
+        return near if abs(near - begin - since) <= ROUNDING else begin + since
+
+    return _later(probe_order(rule, end - begin, step, lambda since: is_open(at(since))), at)
+
+
+def _later(order: Order, at: Callable[[float], float]) -> Order:
+    """An order with its times moved."""
+    answer: bool | None = None
+    while True:
+        try:
+            since = next(order) if answer is None else order.send(answer)
+        except StopIteration:
+            return
+        answer = yield at(since)
 
 
 def _visit(
@@ -175,6 +206,7 @@ def search_f_ttr(
     *,
     visits: Sequence[float] | None = None,
     on_probe: Callable[[Probe], None] | None = None,
+    after: Probe | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
     """Algorithm 1 of the paper.
@@ -192,6 +224,8 @@ def search_f_ttr(
         one, the TTR.
     on_probe : callable, optional
         Called after every probe; an interrupt in between loses nothing that was found.
+    after : Probe, optional
+        A feasible one: only later t_rep are visited, and its curve is where to start from.
     clock : callable
         Monotonic time [s]; a parameter so that tests can bend it.
 
@@ -212,7 +246,7 @@ def search_f_ttr(
     probes: list[Probe] = []
     complete = True
     try:
-        for probe in iter_probes(source, backend, checker, end, settings, clock, visits):
+        for probe in iter_probes(source, backend, checker, end, settings, clock, visits, after):
             probes.append(probe)
             if on_probe is not None:
                 on_probe(probe)

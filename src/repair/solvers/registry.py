@@ -7,7 +7,7 @@ an installed package: group ``repair.backends``, each a :class:`repair.backend.b
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -20,6 +20,7 @@ from repair.errors import BackendError
 from repair.registry import Registry, loaded
 from repair.solvers.casadi.settings import CasadiConfig
 from repair.solvers.ego.settings import EgoConfig
+from repair.solvers.portfolio.settings import PortfolioConfig
 from repair.solvers.shooting.settings import ShootingConfig
 
 __all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
@@ -53,6 +54,13 @@ BACKENDS: Registry[BackendSpec] = Registry(
             ShootingConfig,
             (),
             "controls of the single-track model drawn at random (cross-entropy), true shapes, no guide",
+        ),
+        "portfolio": BackendSpec(
+            "repair.solvers.portfolio.backend:make",
+            PortfolioConfig,
+            (),
+            "several of them, the cheap ones first; the latest repair is the answer",
+            members="members",
         ),
     },
     error=BackendError,
@@ -145,7 +153,36 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
         )
     if spec.helper:
         made.capabilities = replace(made.capabilities, helper=_helper(spec.helper, config))
+    if spec.members:
+        names = getattr(config.section(name), spec.members)
+        made.capabilities = replace(made.capabilities, members=_members(names, config))
     return made
+
+
+def _members(names: Sequence[str], config: Configuration) -> Callable[[], Mapping[str, RepairBackend]]:
+    """The backends of these names, each made when it is first asked for."""
+    return cache(lambda: _Made(names, config))
+
+
+class _Made(Mapping[str, RepairBackend]):
+    """Backends by name, each made when it is first asked for."""
+
+    def __init__(self, names: Sequence[str], config: Configuration) -> None:
+        self._names, self._config = dict.fromkeys(names), config
+        self._made: dict[str, RepairBackend] = {}
+
+    def __getitem__(self, name: str) -> RepairBackend:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._made:
+            self._made[name] = make_backend(name, self._config)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 def _helper(name: str, config: Configuration) -> Callable[[], RepairBackend]:

@@ -1,0 +1,1 @@
+"""Several backends as one: the cheap one first, the others for what is still open."""

@@ -1,0 +1,23 @@
+"""Several backends as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from repair.settings import setting
+
+__all__ = ["PortfolioConfig"]
+
+
+@dataclass
+class PortfolioConfig:
+    """Several backends as one."""
+
+    members: list[str] = setting(
+        factory=lambda: ["ego", "qptr", "shooting", "casadi"],
+        says="the backends that are asked, in this order: the cheap ones first",
+        registry="backend",
+    )
+    bound: bool = setting(
+        True, "once something is found, the bound (bound.*) is asked for what is proven too late"
+    )
