@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,17 +54,32 @@ def test_a_finer_step_is_no_later_and_a_coarser_one_no_earlier(tmp_path):
     assert times == sorted(times)
 
 
-def test_nothing_is_proven_where_there_is_room(tmp_path):
-    """A narrow block: at any time before it, a small swerve avoids it."""
-    situation = prepared(
-        tmp_path,
-        wall(width=0.2, at=60.0).replace(
-            "<y>0.0</y></point></position><orientation><exact>0.0</exact></orientation><time><exact>0</exact></time><velocity><exact>0",
-            "<y>0.7</y></point></position><orientation><exact>0.0</exact></orientation><time><exact>0</exact></time><velocity><exact>0",
-        ),
-    )
-    late = repair.bound(situation)["vehicle"].time
-    assert late > situation.conflict.time - 0.5
+def test_a_post_is_too_late_only_when_no_swerve_avoids_it_either(tmp_path):
+    """At 20 m/s braking takes 0.87 s before contact, and a metre to the side 0.42 s."""
+    situation = prepared(tmp_path, wall(own=20.0, at=120.0, width=0.2))
+    late = repair.bound(situation, BoundConfig(kinds=["vehicle"]))["vehicle"]
+    assert situation.conflict.contact_time - 0.5 < late.time < situation.conflict.contact_time - 0.2
+
+
+def narrow_road(width):
+    """A standing car that fills the lane but for a way past it, which is road or not."""
+    steps = "<time><intervalStart>39</intervalStart><intervalEnd>40</intervalEnd></time>"
+    road = lanelet(1, range(-40, 401, 20), [0.0] * 23, width=width)
+    wanted = problem(100, state(20.0, 0.0, v=15.0), f"<goalState>{steps}</goalState>")
+    return scenario(road=road, obstacles=driving(30, 70.0, 0.0, 0.0, range(1, 81)), problems=wanted)
+
+
+def test_who_leaves_the_road_has_not_avoided_the_conflict(tmp_path):
+    """Where there is road beside the car, a swerve is possible longer than braking."""
+    late = {}
+    for width in (3.5, 20.0):
+        for counts in (True, False):
+            settings = BoundConfig(kinds=["vehicle"], road=counts, nodes=1000)
+            late[width, counts] = repair.bound(prepared(tmp_path, narrow_road(width)), settings)[
+                "vehicle"
+            ].time
+    assert late[3.5, True] < late[3.5, False] - 0.05
+    assert late[20.0, True] == late[20.0, False] == late[3.5, False]
 
 
 def test_without_a_conflict_there_is_nothing_to_prove(tmp_path):
@@ -77,6 +93,20 @@ def test_the_limits_of_the_search_say_nothing_where_they_are_off(tmp_path):
     found = repair.bound(situation)
     assert found["search"].status == "limits_off"
     assert found["vehicle"].proven
+
+
+class Skidding:
+    """A vehicle model of somebody's own, of which nothing is known."""
+
+    def __init__(self, model):
+        self.parameters, self.drive = model.parameters, model.drive
+
+
+def test_of_a_vehicle_model_of_ones_own_nothing_is_known(tmp_path):
+    situation = prepared(tmp_path, wall())
+    scene = replace(situation.scene, model=Skidding(situation.scene.model))
+    found = repair.bound(replace(situation, scene=scene))
+    assert {b.status for b in found.values()} == {"model"}
 
 
 def test_no_time_is_no_proof(tmp_path):

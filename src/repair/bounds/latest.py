@@ -18,6 +18,7 @@ from repair.bounds.settings import BoundConfig
 from repair.bounds.start import driven_within, motions_from
 from repair.bounds.tree import Attempt, attempt
 from repair.timegrid import steps_until
+from repair.vehicle.model import KinematicSingleTrack
 
 if TYPE_CHECKING:
     from repair.situation import Situation
@@ -64,8 +65,9 @@ class Bound:
         t_bound [s]: at this time and later, no motion avoids what the kind counts. Infinite where nothing
         was proven before the conflict.
     status : str
-        ``proven``, or why there is no proof: ``open`` (a relaxed motion meets nothing), ``nodes``, ``time``,
-        ``reference`` (the reference breaks the assumptions itself), ``no_conflict``, ``limits_off``.
+        ``proven``, or why there is no proof: ``open`` (a relaxed motion meets nothing), ``nodes``,
+        ``time``, ``reference`` (the reference breaks the assumptions itself), ``no_conflict``,
+        ``limits_off``, ``model`` (the vehicle is no kinematic single-track model).
     complete : bool
         Whether earlier times were tried until one was not proven too late for another reason than time.
     nodes : int
@@ -174,6 +176,8 @@ class _World:
 def _bound(kind: str, world: _World, settings: BoundConfig) -> Bound:
     if kind == "search" and not world.checker.config.limits:
         return Bound(kind, math.inf, "limits_off")
+    if not isinstance(world.scene.model, KinematicSingleTrack):
+        return Bound(kind, math.inf, "model")
     begin = time.thread_time()
     nodes, found, why, cut = 0, None, "open", False
 

@@ -12,6 +12,7 @@ _NO_PROOF = {
     "nodes": "bound.nodes reached",
     "time": "bound.time_limit reached",
     "reference": "the reference itself goes beyond what is assumed",
+    "model": "the vehicle is no kinematic single-track model",
     "limits_off": "checker.limits is off",
     "no_conflict": "there is no conflict",
 }

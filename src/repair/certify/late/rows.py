@@ -20,6 +20,7 @@ from repair.certify.motion import Motion, wrapped
 from repair.certify.plane import road_of
 from repair.certify.traffic import Body, Traffic
 from repair.errors import RepairError
+from repair.vehicle.model import KinematicSingleTrack
 
 if TYPE_CHECKING:
     from repair.preparation import Prepared
@@ -104,6 +105,8 @@ def _holds(kind: str, time: float, proof: Any, prepared: Prepared, taken: _Taken
         raise Wrong(f"the proof is of {float(proof['t_bound_s']):g} s")
     if kind == "search" and not prepared.config.checker.limits:
         raise Wrong("the limits are off, so nothing bounds what the checker accepts")
+    if not isinstance(prepared.scene.model, KinematicSingleTrack):
+        raise Wrong("the vehicle is no kinematic single-track model")
     m = assumed(kind, prepared, proof["start"])
     place = _start(kind, m, time, proof["start"], prepared, reference)
     _followed(kind, m, time, prepared, reference)
