@@ -21,7 +21,7 @@ CHECKS = {
     "path in the plane": "repair.check.checker:Checker._spliced",
     "driven states": "repair.vehicle.model:KinematicSingleTrack.angles",
     "limits": "repair.check.checker:plane_excess",
-    "margin check": "repair.check.checker:Checker._margin",
+    "margin check": "repair.check.checker:boxes_entered",
     "collision check": "repair.world.collision:CollisionWorld.contact_along",
     "road check": "repair.check.checker:Checker._off_road",
     "kinematic check, direct": "repair.vehicle.model:KinematicSingleTrack.first_undrivable",
