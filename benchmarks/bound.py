@@ -35,8 +35,8 @@ BACKENDS = ("ego", "casadi", "qptr")
 GRID = 0.1
 
 
-def certified(prepared, path: Path, bounds) -> list[bool]:
-    """Whether the certificate's code accepts each proof, as it would be written."""
+def certified(prepared, path: Path, bounds) -> list:
+    """The rows of the certificate about each proof, as it would be written."""
     scene, anew = prepared.scene, read_file(path)
     problem = anew.problems[scene.planning_problem_id]
     traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
@@ -54,7 +54,7 @@ def certified(prepared, path: Path, bounds) -> list[bool]:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / PROOF_FILE).write_bytes(proof_bytes(bounds))
         rows = late_rows(Path(folder), content, prepared, anew.scenario, traffic, reference)
-    return [row.ok for row in rows if "too late" in row.name]
+    return [row for row in rows if "too late" in row.name]
 
 
 def verified(prepared, config) -> dict[str, list[float]]:
@@ -128,13 +128,19 @@ def summary(cases: list[dict], seconds: float) -> list[str]:
                 (case["bounds"][kind].time, *case["shot"][kind]) for case in cases if kind in case["shot"]
             ]
             near = [t - latest for t, _, _, latest in shots if not math.isnan(latest)]
+            text += [
+                f"  {case['file']}, {case['reference']}: a motion at or after it meets nothing"
+                for case in cases
+                if kind in case["shot"] and case["shot"][kind][1]
+            ]
             tried, free = sum(s[1] for s in shots), sum(s[2] for s in shots)
             text.append(f"  {tried} motions at and after it by shooting: {free} meet nothing")
             text.append(
                 f"  the latest before it that meets nothing: {np.median(near):.3f} s earlier (median)"
             )
-    proofs = [ok for case in cases for ok in case["certified"]]
-    text.append(f"{sum(proofs)} of {len(proofs)} proofs pass the certificate")
+    proofs = [(case, row) for case in cases for row in case["certified"]]
+    text.append(f"{sum(row.ok for _, row in proofs)} of {len(proofs)} proofs pass the certificate")
+    text += [f"  {case['file']}, {row.name}: {row.unit}" for case, row in proofs if not row.ok]
     if "verified" in cases[0]:
         repairs = [(case, t) for case in cases for times in case["verified"].values() for t in times]
         late = sum(t >= b.time - 1e-9 for case, t in repairs for b in case["bounds"].values())

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repair.bounds.obstacles import occupied
+from repair.bounds.edges import no_road
+from repair.bounds.obstacles import occupied, with_standing
 
 _STEP = 0.005  # of the integration [s]
 _SHARE = 0.999  # of the largest acceleration that is used
@@ -40,6 +41,10 @@ class Shooting:
         self.states = self.checker.drive(prepared.reference, prepared.t_reference)
         count = self.scene.n_steps * self.substeps + 1
         self.shapes = occupied(self.scene.obstacles, count, self.substeps)
+        if self.checker.road is not None:  # only to see how far a motion is over the edge
+            k = min(round(prepared.conflict.time / self.h), len(self.states) - 1)
+            centre = np.array([self.states.x[k], self.states.y[k]])
+            self.shapes = with_standing(self.shapes, no_road(self.checker.road.region, centre, 40.0, 0.0))
         self.stop = min(round(t_end / self.h), count - 1)
         start = self.scene.initial_state
         self.margin = self.checker.config.clearance if kind == "search" else 0.0
@@ -109,7 +114,8 @@ class Shooting:
             shapes = self.shapes.vertices[k + i]
             shapes = shapes[np.isfinite(shapes[:, 0, 0])]
             x, y, psi = poses[:, i].T
-            near = np.hypot(shapes[:, 0, 0] - x.mean(), shapes[:, 0, 1] - y.mean()) < 40.0
+            away = np.hypot(shapes[..., 0] - x.mean(), shapes[..., 1] - y.mean())
+            near = away.min(axis=1) < 60.0
             c, s = np.cos(psi)[:, None], np.sin(psi)[:, None]
             bx, by = (
                 x[:, None] + c * corners[:, 0] - s * corners[:, 1],
@@ -130,12 +136,15 @@ class Shooting:
         return total
 
     def free(self, k: int, poses: np.ndarray) -> bool:
-        """Whether one motion (T, 3) meets nothing, by the checker's world in continuous time."""
+        """Whether one motion (T, 3) meets nothing and stays on the road, by the checker's own measures."""
         centre = poses[:, 0] + 1j * poses[:, 1]
         turn, beside = np.ascontiguousarray(poses[:, 2]), self.beside if self.margin else frozenset()
         world = self.checker.world
         met = world.contact_along(centre, turn, k, margin=self.margin, beside=beside)
-        return met is None and world.contact_along(centre, turn, k) is None
+        if met is not None or world.contact_along(centre, turn, k) is not None:
+            return False
+        road = self.checker.road
+        return road is None or road.first_off_road(poses[:, 0], poses[:, 1], turn) is None
 
     def best(self, t_rep: float, tries: int = 256, rounds: int = 10, pieces: int = 6, seed: int = 0) -> Shot:
         """Search for a motion from a time to react on that meets nothing."""

@@ -137,7 +137,9 @@ def test_the_earliest_is_found_whatever_it_is(last):
         assert len(set(asked)) == len(asked)
 
 
-@pytest.mark.parametrize("seed", [4, 5, 8, 10, 11])
+@pytest.mark.parametrize(
+    "seed", [4, 11, *(pytest.param(s, marks=pytest.mark.exhaustive) for s in range(12, 40))]
+)
 def test_no_motion_is_found_at_or_after_a_bound(tmp_path, seed):
     """Traffic of any shape, speed and step; direct shooting knows nothing of the proof."""
     situation = prepared(tmp_path, crossing(seed).text)

@@ -121,11 +121,11 @@ def _start(
     kind: str, m: Assumed, time: float, told: Mapping[str, Any], prepared: Prepared, reference: Motion
 ) -> tuple[float, float]:
     """Where the proof starts, which has to be where the reference is."""
-    k = int(np.argmin(np.abs(reference.t - time)))
-    if abs(float(reference.t[k]) - time) > 1e-6:
-        raise Wrong("it starts when the reference does not")
+    if not 0.0 <= time <= float(reference.t[-1]):
+        raise Wrong("it starts when the reference is over")
     rear = prepared.scene.vehicle.rear
-    (x, y, psi), theta, v = reference.poses[k], float(reference.heading[k]), float(reference.speed[k])
+    columns = (*reference.poses.T, reference.heading, reference.speed)
+    x, y, psi, theta, v = (float(np.interp(time, reference.t, column)) for column in columns)
     slip = float(wrapped(theta - psi))
     rate = v * math.sin(slip) / rear
     velocity = v * math.cos(theta), v * math.sin(theta)
