@@ -130,11 +130,11 @@ def misses(goal: GoalState, places: Array, speed: Array, orientation: Array, dt:
         "velocity": (goal.too_fast(speed), "m/s"),
     }
     columns = np.array([values for values, _ in conditions.values()])
-    count, size = np.count_nonzero(columns > 1e-9, axis=0), columns.sum(axis=0)
+    count, size = np.count_nonzero(columns > 0.0, axis=0), columns.sum(axis=0)
     # In time first, if it ever is: what is missed there says more than by how much the time is.
     k = int(np.lexsort((size, count, late))[0])
     return tuple(
         Miss(name, float(values[k]), unit, k * dt)
         for name, (values, unit) in conditions.items()
-        if values[k] > 1e-9
+        if values[k] > 0.0
     )
