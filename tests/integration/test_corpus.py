@@ -165,8 +165,9 @@ def test_backends_that_do_not_agree(file: Path) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def worthless():
-    """A backend that solves nothing."""
+    """A backend that solves nothing; taken back afterwards, as the names of all backends are documented."""
     from repair.backend.base import Capabilities, SolveResult, SolveStatus
+    from repair.solvers.registry import BACKENDS
 
     class Worthless:
         name, capabilities = "worthless", Capabilities()
@@ -175,6 +176,8 @@ def worthless():
             return SolveResult(SolveStatus.INFEASIBLE, None, detail="not solved on purpose")
 
     repair.register_backend("worthless", lambda config: Worthless())
+    yield
+    BACKENDS.unregister("worthless")
 
 
 def test_an_answer_that_hangs_on_the_place(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
