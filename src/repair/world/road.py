@@ -75,21 +75,29 @@ class RoadBoundary:
         self._triangles: Any = None
 
     def over_a_gap(self, x: Array, y: Array, orientation: Array) -> str:
-        """Where poses (K,) first cross what counts as road and is drawn by nobody, in words; or nothing."""
+        """Where poses (K,) first cross what is road here and in no section of the map, or nothing."""
         import shapely
 
-        if self.region is self._drawn or not len(x):
+        if not len(x):
             return ""
-        bodies = shapely.polygons(self.outline(x, y, orientation))
-        for body in bodies[~shapely.covers(self._drawn, bodies)]:
-            part = shapely.difference(body, self._drawn)
+        bodies, sections = shapely.polygons(self.outline(x, y, orientation)), self._sections
+        for body in bodies[~shapely.covers(sections, bodies)]:
+            part = shapely.difference(shapely.intersection(body, self.region), sections)
             if (area := float(shapely.area(part))) > _SLIVER:
                 at = shapely.centroid(part)
                 return (
                     f"the way crosses a gap of the map at ({at.x:.1f}, {at.y:.1f}), {area:.3f} m² under the "
-                    "ego, which counts as road (checker.road_gap) and not for CommonRoad's own boundary check"
+                    "ego, or lanelets drawn askew: road here (checker.road_gap), and none for CommonRoad's "
+                    "own boundary check"
                 )
         return ""
+
+    @cached_property
+    def _sections(self) -> Any:
+        """What the drivability checker has as road: the sections alone."""
+        import shapely
+
+        return shapely.union_all(_outlines(self._scenario.lanelet_network, sections_alone=True))
 
     def bridged(self, near: Any = None) -> list[Bridge]:
         """The gaps and holes of the map that count as road.
@@ -264,7 +272,7 @@ def grouping(count: int, size: int) -> npt.NDArray[np.intp]:
     return by_place
 
 
-def _outlines(network: Any) -> list[Any]:
+def _outlines(network: Any, *, sections_alone: bool = False) -> list[Any]:
     """What is road as drawn: the sections, and each lanelet of those whose outline crosses itself.
 
     Where neighbours differ in length or bend away from each other the ring around them may cross itself, and
@@ -276,7 +284,7 @@ def _outlines(network: Any) -> list[Any]:
     for members, outline in _sections(network):
         section = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
         found.append(section if section.is_valid else section.buffer(0))
-        if not section.is_valid:
+        if not section.is_valid and not sections_alone:
             lanes = [lanelets[member] for member in members]
             rings = [np.concatenate([x.left_vertices, x.right_vertices[::-1]])[:, :2] for x in lanes]
             # One whose left bound lies on its right is no lanelet: the drivability checker has no road there.
