@@ -160,6 +160,12 @@ class _Source:
     def widened(self, t_rep):
         return ()
 
+    def along(self, manoeuvre, kind, *, jumps=False):
+        return self.at(manoeuvre.t_start)[0]
+
+    def without_guide(self, t_rep):
+        return self.at(t_rep)
+
 
 class _Checker:
     def check(self, problem, curve):

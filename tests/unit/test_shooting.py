@@ -12,11 +12,17 @@ import repair
 from repair.api import find
 from repair.arrays import frozen
 from repair.backend.base import SolveStatus
+from repair.certify.hull import seam_rows
 from repair.certify.recompute import certify
 from repair.check.limits import curve_excess, plane_excess
 from repair.config import load_config
+from repair.curves.base import FrenetTrajectory
+from repair.curves.sampled import SampledCurve
 from repair.paper.bundled import paper_scenario
+from repair.problem.problem import Maneuver
 from repair.problem.shapes import Shapes
+from repair.problem.taken import begun, taken
+from repair.reference.profile import SpeedProfile
 from repair.scene.frame import FrenetFrame
 from repair.scene.traffic.obstacle import Obstacle
 from repair.solvers.shooting.backend import ShootingBackend
@@ -149,6 +155,46 @@ def test_the_seed_decides_and_nothing_else():
     np.testing.assert_array_equal(points[0], points[1])
     assert first.iterations > 2, "nothing was drawn"
     assert not np.array_equal(points[0], points[2])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_start_with_another_acceleration_keeps_the_limits(seed):
+    random, limits = np.random.default_rng(seed), toy.LIMITS
+    start = np.array([[5.0, 0.0], [12.0, 0.1], [0.3, -0.2]])
+    wanted, kappa = random.normal(0.0, 10.0, 2), float(random.uniform(-0.02, 0.02))
+    made = begun(start, wanted, kappa, limits, True)
+    np.testing.assert_array_equal(made[:2], start[:2])
+    along, across = made[2, 0], made[2, 1] + kappa * 144.0
+    assert limits.a_min <= along <= limits.a_max
+    assert abs(across) <= limits.a_lat
+    assert np.hypot(along, across) <= limits.a_total
+    kept = begun(start, np.array([-1.0, 0.5]), 0.0, limits, True)
+    np.testing.assert_allclose(kept[2], [-1.0, 0.5])
+    assert begun(start, wanted, kappa, limits, False)[2, 1] == -0.2
+
+
+def test_what_a_curve_does_is_told_by_where_it_leads():
+    def shifted(along, aside):
+        ends = frozen([[0.0, 0.0], [40.0 + along, aside]])
+        speed = frozen([[10.0, 0.0], [10.0, 0.0]])
+        still = frozen(np.zeros((2, 2)))
+        return SampledCurve(FrenetTrajectory(frozen([0.0, 4.0]), ends, speed, still, still))
+
+    problem = toy.problem([])
+    assert taken(problem, shifted(0.0, 1.0)) is Maneuver.LEFT
+    assert taken(problem, shifted(3.0, -1.0)) is Maneuver.RIGHT
+    assert taken(problem, shifted(3.0, 0.1)) is Maneuver.GO_AHEAD
+    assert taken(problem, shifted(-3.0, 0.1)) is Maneuver.YIELD
+
+
+def test_a_jump_at_the_seam_is_a_claim_up_to_what_the_result_says():
+    reference, stop = toy.constant(10.0), SpeedProfile.from_accelerations(0.0, 10.0, [1.0, 20.0], [-8.0, 0.0])
+    said = {row.name: row for row in seam_rows(reference, stop, 0.0, jumps=False, jump=8.0)}
+    assert all(row.ok and row.claim for row in said.values())
+    unsaid = {row.name: row for row in seam_rows(reference, stop, 0.0, jumps=False)}
+    assert not unsaid["jump in acceleration at the seam"].ok
+    told = {row.name: row for row in seam_rows(reference, stop, 0.0, jumps=True)}
+    assert not told["jump in acceleration at the seam"].claim
 
 
 def test_sets_hold_on_both_sides_of_their_step():

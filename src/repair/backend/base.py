@@ -66,9 +66,10 @@ class Capabilities:
         without a guide (``problem.passing`` is None), and with the true shapes (``problem.shapes``).
     jumps : bool
         The acceleration of its curves may jump, at t_rep too, as an input of the vehicle's model may.
-    helper : callable or None
-        Makes the backend that the search asks where this one has found nothing. If the checker accepts a
-        curve of that one, this one is asked again, with that curve as guide and ``warm_start``.
+    helpers : tuple of callable
+        Each makes a backend that the search asks where this one has found nothing, one after the other. If
+        the checker accepts a curve of it, this one is asked again, with that curve as guide and
+        ``warm_start``.
     members : callable or None
         Makes the backends that it is made of, by name: the search makes a search of each.
     """
@@ -78,7 +79,7 @@ class Capabilities:
     uses_warm_start: bool = False
     own_way: bool = False
     jumps: bool = False
-    helper: Callable[[], RepairBackend] | None = None
+    helpers: tuple[Callable[[], RepairBackend], ...] = ()
     members: Callable[[], Mapping[str, RepairBackend]] | None = None
 
 
@@ -203,8 +204,8 @@ class BackendSpec:
         Packages without which it cannot be made.
     says : str
         One line for people.
-    helper : str
-        Name of the backend that :attr:`Capabilities.helper` makes; empty for none.
+    helpers : tuple of str
+        Names of the backends that :attr:`Capabilities.helpers` make.
     members : str
         Field of its settings that names the backends that :attr:`Capabilities.members` makes; empty for none.
     """
@@ -213,5 +214,5 @@ class BackendSpec:
     settings: type | None = None
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
-    helper: str = ""
+    helpers: tuple[str, ...] = ()
     members: str = ""

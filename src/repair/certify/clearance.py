@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _NAME = "distance to the nearest inflated obstacle"
 
-__all__ = ["boxes_kept", "clearance_rows"]
+__all__ = ["boxes_kept", "clearance_rows", "jump_said"]
 
 
 def boxes_kept(content: Mapping[str, Any]) -> float | None:
@@ -38,6 +38,12 @@ def boxes_kept(content: Mapping[str, Any]) -> float | None:
     if not hard:
         return None
     return min(0.0, float(best[0].get("margin_m") or 0.0))
+
+
+def jump_said(content: Mapping[str, Any]) -> float:
+    """By how much the acceleration jumps where a repair begins, by its own word [m/s²]."""
+    best = [p for p in content["probes"] if p["feasible"] and p["t_rep_s"] == content["f_ttr_s"]]
+    return abs(float(best[0].get("jump_mps2") or 0.0)) if best else 0.0
 
 
 def clearance_rows(

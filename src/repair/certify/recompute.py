@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.certify.certificate import Certificate, CertificateRow
-from repair.certify.clearance import boxes_kept, clearance_rows
+from repair.certify.clearance import boxes_kept, clearance_rows, jump_said
 from repair.certify.hull import derivative_rows, seam_rows
 from repair.certify.late.rows import late_rows
 from repair.certify.limits import driven_rows, physical_rows, weakened
@@ -108,7 +108,9 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows: list[CertificateRow] = []
     if curve is not None:
         said = content.get("capabilities") or {}
-        rows += seam_rows(prepared.reference, curve, t_rep, jumps=bool(said.get("jumps", False)))
+        rows += seam_rows(
+            prepared.reference, curve, t_rep, jumps=bool(said.get("jumps", False)), jump=jump_said(content)
+        )
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
         allowed, margin = boxes_kept(content), prepared.config.checker.margin
         rows += clearance_rows(curve, prepared.occupancy, dt, t_repaired, allowed, margin)

@@ -93,6 +93,7 @@ _LATER: dict[str, Test] = {
     "peak_acceleration_mps2": _maybe(_number),
     "margin_m": _maybe(_number),
     "backend": _text,
+    "jump_mps2": _maybe(_number),
 }
 _TRAJECTORY: dict[str, Test] = {
     "initial_time_step": _whole,

@@ -138,7 +138,7 @@ def record_of(
 
 
 def _plain(capabilities: Capabilities) -> dict[str, Any]:
-    return {name: can for name, can in asdict(capabilities).items() if name not in ("helper", "members")}
+    return {name: can for name, can in asdict(capabilities).items() if name not in ("helpers", "members")}
 
 
 def _beyond(beyond: Beyond | None) -> dict[str, Any] | None:
@@ -193,6 +193,7 @@ def _probe(prepared: Prepared, probe: Probe) -> dict[str, Any]:
         "details": [detail_of(v) for v in probe.verdict.violations],
         "maneuver": probe.maneuver.value if probe.maneuver is not None else None,
         "margin_m": number(probe.margin),
+        "jump_mps2": number(probe.jump),
         "tried": list(probe.tried),
         "solver_status": solve.status.value,
         "solver_detail": solve.detail,

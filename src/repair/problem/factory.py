@@ -18,6 +18,7 @@ from repair.problem.settings import RepairConfig
 from repair.problem.shapes import Shapes
 from repair.problem.surroundings import Surroundings, sides_of, surroundings
 from repair.problem.tables import Grid
+from repair.problem.taken import begun
 from repair.scene.road.bounds import LateralBounds
 from repair.timegrid import INSTANT, intervals
 from repair.world.boxes import Occupancy
@@ -147,7 +148,7 @@ class ProblemFactory:
         _, start, occupancy, _ = self._scenery(t_rep, times, settings.margin, lateral)
         return (self._problem(t_rep, start, occupancy, settings.margin, None, lateral),)
 
-    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+    def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
         """The problem at the start of a manoeuvre, with the manoeuvre as the guide, open or not.
 
         Parameters
@@ -156,12 +157,17 @@ class ProblemFactory:
             From its time-to-repair on: a fixed manoeuvre, or what a backend found.
         kind : Maneuver
             What it does about the conflict.
+        jumps : bool
+            The repair begins with the acceleration of the manoeuvre, and not with that of the reference.
         """
         settings, step, t_rep = self.settings, self.scene.dt, manoeuvre.t_start
         times = t_rep + step * np.arange(intervals(self.t_end - t_rep, step) + 1)
         reference, guide = self.reference.sample(times), manoeuvre.sample(times)
         start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
         lateral = settings.lateral != "none" and kind in (Maneuver.LEFT, Maneuver.RIGHT)
+        if jumps:
+            kappa = float(self.scene.frame.curvature(start[0, 0]))
+            start = begun(start, guide.acceleration[0], kappa, self.limits, lateral)
         occupancy = self._within_reach(start, t_rep, reference.position, lateral)
         lower, upper = occupancy.at(times)
         columns = (guide.t, guide.position, guide.velocity, guide.acceleration, guide.jerk)
@@ -266,6 +272,10 @@ class Unguided:
         _, edge, ease = self.factory.notches
         return (), edge, ease
 
-    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+    def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
         """See :meth:`ProblemFactory.along`."""
-        return self.factory.along(manoeuvre, kind)
+        return self.factory.along(manoeuvre, kind, jumps=jumps)
+
+    def without_guide(self, t_rep: float) -> tuple[RepairProblem, ...]:
+        """As :meth:`at`."""
+        return self.at(t_rep)

@@ -13,6 +13,7 @@ from repair.check.verdict import Reason, Verdict, Violation
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
 from repair.problem.problem import Maneuver, RepairProblem
+from repair.problem.taken import taken
 from repair.search.result import Probe
 
 __all__ = [
@@ -50,8 +51,15 @@ class ProblemSource(Protocol):
         """By what a rejected problem is tightened, step by step: room [m], road [m], limits (shares)."""
         ...
 
-    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
-        """The problem at the start of a curve, with that curve as the guide; asked for with a helper only."""
+    def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
+        """The problem at the start of a curve, with that curve as the guide; asked for with a helper only.
+
+        With ``jumps`` it begins with the acceleration of that curve.
+        """
+        ...
+
+    def without_guide(self, t_rep: float) -> Sequence[RepairProblem]:
+        """The problem for a helper that finds its own way."""
         ...
 
 
@@ -151,6 +159,8 @@ def probe_one(
         solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
         verdict = _unsolved(solve, t_rep)
     maneuver = problem.passing.maneuver if problem.passing is not None else None
+    if maneuver is None and backend.capabilities.own_way and solve.curve is not None:
+        maneuver = taken(problem, solve.curve)
     return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
 
 

@@ -18,7 +18,8 @@ __all__ = ["Probe", "SearchResult", "SearchStatus"]
 class Probe:
     """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said.
 
-    Where several backends are asked, ``by`` is the one that was.
+    Where several backends are asked, ``by`` is the one that was; ``jump`` is by how much the acceleration was
+    made to differ from that of the reference where the repair begins [m/s²].
     """
 
     t_rep: float
@@ -29,6 +30,7 @@ class Probe:
     tried: tuple[str, ...] = ()
     margin: float | None = None
     by: str = ""
+    jump: float = 0.0
 
     @property
     def feasible(self) -> bool:

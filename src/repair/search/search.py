@@ -165,27 +165,52 @@ def _helped(
     sides: str,
     budget: Budget,
 ) -> Probe:
-    """The backend asked once more, from a curve of its helper that the checker accepts.
+    """The backend asked once more, from a curve of a helper that the checker accepts; one after the other.
 
     A hard backend gives up where its guides or its boxes leave it nothing; what has been verified proves that
     there is a way. The helper's curve itself is no answer: it may keep less than this backend claims.
     """
-    make = backend.capabilities.helper
-    if make is None or any(problem.strict for problem in first):
-        return probe
-    try:
-        helper, t_rep = make(), probe.t_rep
-    except OutOfTime as late:  # the search goes on without
-        return replace(probe, tried=(*probe.tried, f"no other backend asked: {late}"))
-    found = _visit(t_rep, first, source, helper, checker, sides, None, budget)
+    for make in backend.capabilities.helpers if not any(problem.strict for problem in first) else ():
+        if probe.feasible or budget.spent:
+            break
+        try:
+            helper = make()
+        except OutOfTime as late:  # the search goes on without
+            probe = replace(probe, tried=(*probe.tried, f"no other backend asked: {late}"))
+        else:
+            probe = _helped_by(helper, probe, first, source, backend, checker, sides, budget)
+    return probe
+
+
+def _helped_by(
+    helper: RepairBackend,
+    probe: Probe,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    budget: Budget,
+) -> Probe:
+    """As :func:`_helped`, of one helper."""
+    t_rep, can = probe.t_rep, helper.capabilities
+    problems = source.without_guide(t_rep) if can.own_way else first
+    found = _visit(t_rep, problems, source, helper, checker, sides, None, budget)
     if not found.feasible or found.solve.curve is None:
         return probe
-    along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD)
-    again = probe_one(t_rep, along, backend, checker, found.solve.curve, budget)
+    along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD, jumps=can.jumps)
+    curve = found.solve.curve
+    again = probe_one(t_rep, along, backend, checker, curve, budget)
+    if not again.feasible and any(source.notches):
+        again = probe_again(
+            again, [(along, again.verdict)], source,
+            lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), sides, budget,
+        )  # fmt: skip
     said = f"from a curve of {helper.name} that passes every check"
     tried = (*probe.tried, f"{words(again)} ({said})")
     if again.feasible:
-        return replace(again, tried=tried)
+        usual = along.reference.sample([t_rep]).acceleration[0]
+        return replace(again, tried=tried, jump=max(abs(along.start[2] - usual).tolist()))
     why = again.solve.detail if again.solve.curve is None else words(again)
     return replace(
         probe, tried=tried, solve=replace(probe.solve, detail=f"{probe.solve.detail}; {said}: {why}")

@@ -118,4 +118,4 @@ def capabilities_of(backend: RepairBackend, found: SearchResult) -> Capabilities
     can, best = backend.capabilities, found.best
     if can.members is not None and best is not None and best.by:
         can = can.members()[best.by].capabilities
-    return replace(can, helper=None, members=None)
+    return replace(can, helpers=(), members=None)

@@ -41,7 +41,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             CasadiConfig,
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
-            helper="ego",
+            helpers=("ego", "shooting"),
         ),
         "qptr": BackendSpec(
             "repair.baselines.qptr.backend:make",
@@ -151,8 +151,9 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
         raise BackendError(
             f"backend {name!r} declares no capabilities; it needs an attribute capabilities = Capabilities()"
         )
-    if spec.helper:
-        made.capabilities = replace(made.capabilities, helper=_helper(spec.helper, config))
+    if spec.helpers:
+        helpers = tuple(_helper(each, config) for each in spec.helpers)
+        made.capabilities = replace(made.capabilities, helpers=helpers)
     if spec.members:
         names = getattr(config.section(name), spec.members)
         made.capabilities = replace(made.capabilities, members=_members(names, config))

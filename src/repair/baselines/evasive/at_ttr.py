@@ -72,6 +72,10 @@ class AtTtr:
         """As the search has them: see :attr:`repair.search.probe.ProblemSource.notches`."""
         return self.factory.notches
 
-    def along(self, manoeuvre: Curve, kind: Maneuver) -> RepairProblem:
+    def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
         """The problem at the start of a curve, with that curve as the guide."""
-        return self.factory.along(manoeuvre, kind)
+        return self.factory.along(manoeuvre, kind, jumps=jumps)
+
+    def without_guide(self, t_rep: float) -> tuple[RepairProblem, ...]:
+        """See :meth:`repair.problem.factory.ProblemFactory.without_guide`."""
+        return self.factory.without_guide(t_rep)
