@@ -28,14 +28,14 @@ from repair.scene.traffic.obstacle import Obstacle
 from repair.solvers.shooting.backend import ShootingBackend
 from repair.solvers.shooting.curve import curve_along, curve_of
 from repair.solvers.shooting.motion import Car, drive_along, drive_freely
-from repair.solvers.shooting.plans import ALONG, FREE
+from repair.solvers.shooting.plans import ALONG, FREE, Steps
 from repair.solvers.shooting.settings import ShootingConfig
 from repair.vehicle.parameters import load_vehicle
 from repair.vehicle.single_track import drive
 from repair.vehicle.transitions import direct_check
 
 VEHICLE = load_vehicle(1)
-STEPS = 40
+STEPS = Steps(40, toy.DT)
 
 
 def bend(radius=60.0, length=200.0):
@@ -69,11 +69,11 @@ def car_of(problem, slack=0.0):
 def test_whatever_is_drawn_keeps_the_limits(seed, v0):
     problem = among(toy.problem([], v0=v0), bend())
     rows = FREE.kept(np.random.default_rng(seed).normal(0.0, 1.0, (6, FREE.size)))
-    wanted = FREE.accelerations(rows, STEPS, toy.DT, -9.0, 9.0)
+    wanted = FREE.accelerations(rows, STEPS, 0.0, -9.0, 9.0)
     start = np.array([0.0, 0.0, v0, 0.0, 0.0])
-    tail = FREE.tail(rows, toy.DT)
-    driven = drive_freely(car_of(problem), start, wanted, FREE.steering(rows, STEPS, toy.DT), tail)
-    times = np.arange(STEPS * 4 + 1) * toy.DT / 4
+    tail = FREE.tail(rows, STEPS)
+    driven = drive_freely(car_of(problem), start, wanted, FREE.steering(rows, STEPS), tail)
+    times = np.arange(STEPS.count * 4 + 1) * toy.DT / 4
     limits = toy.LIMITS
     for k in range(len(rows)):
         if np.abs(driven.l[k]).max() > 6.0:
@@ -90,10 +90,8 @@ def test_what_is_driven_is_what_the_vehicle_drives():
     problem = among(toy.problem([]), bend())
     rows = FREE.kept(np.random.default_rng(1).normal(0.0, 0.6, (8, FREE.size)))
     start = np.array([0.0, 0.0, 10.0, 0.0, 0.0])
-    wanted = FREE.accelerations(rows, STEPS, toy.DT, -6.0, 4.0)
-    driven = drive_freely(
-        car_of(problem), start, wanted, FREE.steering(rows, STEPS, toy.DT), FREE.tail(rows, toy.DT)
-    )
+    wanted = FREE.accelerations(rows, STEPS, 0.0, -6.0, 4.0)
+    driven = drive_freely(car_of(problem), start, wanted, FREE.steering(rows, STEPS), FREE.tail(rows, STEPS))
     for k in range(len(rows)):
         curve = curve_of(problem, driven.take(np.array([k])), car_of(problem))
         path = problem.shapes.frame.cartesian(curve.sample(np.arange(0.0, 4.0 - 1e-9, toy.DT / 20)))
@@ -105,9 +103,9 @@ def test_what_is_driven_is_what_the_vehicle_drives():
 
 def test_along_the_path_it_stays_on_the_path():
     problem = among(toy.problem([], lateral=False), bend())
-    wanted = ALONG.accelerations(np.full((1, ALONG.size), -0.5), STEPS, toy.DT, -8.0, 4.0)
+    wanted = ALONG.accelerations(np.full((1, ALONG.size), -0.5), STEPS, 0.0, -8.0, 4.0)
     driven = drive_along(car_of(problem), np.array([0.0, 0.0, 10.0, 0.0, 0.0]), wanted)
-    curve = curve_along(problem, driven)
+    curve = curve_along(problem, driven, car_of(problem))
     samples = curve.sample(np.linspace(0.0, 4.0, 81))
     assert np.abs(samples.position[:, 1]).max() == 0.0
     assert samples.acceleration[0, 0] == pytest.approx(-4.0)
@@ -137,6 +135,32 @@ def test_true_shapes_are_passed_where_their_boxes_are_shut():
     found = ShootingBackend().solve(free)
     assert found.status is SolveStatus.SOLVED, found.detail
     assert found.curve.sample([4.0]).position[0, 0] > 25.0
+
+
+@pytest.mark.parametrize(
+    "t_rep, dt, lead, each, straight",
+    [
+        (0.3, 0.1, 0, 1, 0),
+        (0.3, 0.25, 4, 5, 4),
+        (0.1, 0.04, 1, 2, 1),
+        (0.0, 0.25, 0, 1, 1),
+        (0.1, 0.3, 2, 3, 2),
+    ],
+)
+def test_controls_change_at_the_scenarios_steps_only(t_rep, dt, lead, each, straight):
+    """A transition with two accelerations is none that the drivability checker knows."""
+    steps = Steps.between(t_rep, 3.0, dt)
+    assert (steps.lead, steps.each, steps.straight) == (lead, each, straight)
+    rows = FREE.kept(np.random.default_rng(0).normal(0.0, 1.0, (5, FREE.size)))
+    wanted = FREE.accelerations(rows, steps, 0.7, -9.0, 9.0)
+    assert (wanted[:, :lead] == 0.7).all()
+    begins = t_rep + steps.dt * np.arange(1, steps.count)
+    changes = (np.diff(wanted, axis=1) != 0.0).any(axis=0)
+    assert changes.any()
+    place = begins[changes] / dt
+    np.testing.assert_allclose(place, np.rint(place), atol=1e-6)
+    assert (FREE.steering(rows, steps)[:, :straight] == 0.0).all()
+    assert (FREE.tail(rows, steps).step >= straight).all()
 
 
 def test_what_comes_closest_is_handed_over():

@@ -19,5 +19,5 @@ class PortfolioConfig:
         registry="backend",
     )
     bound: bool = setting(
-        True, "once something is found, the bound (bound.*) is asked for what is proven too late"
+        False, "once something is found, the bound (bound.*) is asked for what is proven too late"
     )

@@ -39,17 +39,17 @@ def curve_of(problem: RepairProblem, driven: Driven, car: Car) -> BernsteinCurve
         return np.array((forward, a * sin + v[k] * cos * chi_rate))
 
     first, last = bends(slice(None, -1)), bends(slice(1, None))
-    return _quintics(problem, np.array((s, l)), np.array((along, aside)), first, last, 0.5 * problem.dt)
+    return _quintics(problem, np.array((s, l)), np.array((along, aside)), first, last, 0.5 * car.dt)
 
 
-def curve_along(problem: RepairProblem, driven: Driven) -> BernsteinCurve:
+def curve_along(problem: RepairProblem, driven: Driven, car: Car) -> BernsteinCurve:
     """The first of the trajectories, which keep to the path of the reference, at its offset then."""
     s, _, v, _, _, a, _ = (column[0] for column in driven)
-    times = problem.t_rep + problem.dt * np.arange(len(s))
+    times = problem.t_rep + car.dt * np.arange(len(s))
     path = problem.reference.sample(times)
     l, rate, bend = path.position[:, 1], path.velocity[:, 1], path.acceleration[:, 1]  # noqa: E741
     first, last = np.array((a, bend[:-1])), np.array((a, bend[1:]))
-    return _quintics(problem, np.array((s, l)), np.array((v, rate)), first, last, problem.dt)
+    return _quintics(problem, np.array((s, l)), np.array((v, rate)), first, last, car.dt)
 
 
 def _quintics(

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Car", "Driven", "Tail", "drive_along", "drive_freely", "halved"]
 
 _CRAWLS = 0.3  # below this speed [m/s] nobody steers: a path that stands has no direction
-_ORIENTATION = 0.03  # what the drivability checker allows [rad]
+_ORIENTATION, _POSITION = 0.03, 0.02  # what the drivability checker allows [rad], [m]
 _SPARE = 1.01  # what is taken across is counted as so much more: the axis bends within a step too
 _CLOSE = 1.2  # [s] in which an offset is closed by the tail's law
 _TURN = 0.35  # [s] in which a direction is taken up
@@ -52,6 +52,8 @@ class Car:
         Share of the drivability checker's tolerance of the orientation that faster steering may use.
     parts : int
         Steps of the integration to a step of the controls.
+    each : int
+        Steps to one of the scenario's, over which the drivability checker looks.
     """
 
     vehicle: Vehicle
@@ -60,6 +62,7 @@ class Car:
     dt: float
     slack: float
     parts: int = 1
+    each: int = 1
 
     def acceleration(self, wanted: Array, v: Array, across: Array) -> Array:
         """The acceleration (N,) nearest to the wanted one that tyres, engine and speeds allow.
@@ -81,9 +84,10 @@ class Car:
         car, dt = self.vehicle, self.dt
         ratio = car.wheelbase / car.rear
         delta = np.arctan(ratio * np.tan(beta))
-        rate = car.steering_rate_max * dt + self.slack * _ORIENTATION * 2.0 * car.wheelbase / (
-            np.maximum(v, 1.0) * dt
-        )
+        v, step = np.maximum(v, 1.0), dt * self.each
+        # How far a wheel that is ahead of what it can turns the body, and shifts it, until the step's end.
+        over = np.minimum(_ORIENTATION * 2.0 / (v * step), _POSITION * 6.0 / (v * step) ** 2)
+        rate = car.steering_rate_max * dt + self.slack * car.wheelbase * over / self.each
         most = 0.95 * car.steering_max
         low, high = np.maximum(delta - rate, -most), np.minimum(delta + rate, most)
         low, high = np.arctan(np.tan(low) / ratio), np.arctan(np.tan(high) / ratio)

@@ -10,13 +10,63 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.solvers.shooting.motion import Tail
+from repair.timegrid import INSTANT, STEP, intervals
 
-__all__ = ["ALONG", "FREE", "Plan", "first_along", "first_freely"]
+__all__ = ["ALONG", "FREE", "Plan", "Steps", "first_along", "first_freely"]
 
 # When the pieces of constant acceleration end, and those of constant steering rate [s]: short ones first.
 _PEDAL = (0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.4)
 _WHEEL = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.1, 2.4)
+_PARTS = 10  # of a scenario's step at most
 _WIDEST = 5.0  # offset of the path that is followed in the end [m]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The steps that are driven: whole parts of the scenario's, within which no control changes.
+
+    Attributes
+    ----------
+    count : int
+    dt : float
+        Length of each [s].
+    lead : int
+        How many of the first ones belong to a step of the scenario that has begun before t_rep: the
+        reference has decided about its acceleration.
+    each : int
+        How many there are to a step of the scenario.
+    straight : int
+        How many of the first ones are driven as the reference steers.
+    """
+
+    count: int
+    dt: float
+    lead: int = 0
+    each: int = 1
+    straight: int = 0
+
+    @classmethod
+    def between(cls, t_rep: float, t_end: float, dt: float) -> Steps:
+        """From ``t_rep`` to ``t_end``, of a scenario with steps of ``dt`` [s].
+
+        Where the scenario's steps and t_rep have no small step in common, the steps begin at t_rep.
+        """
+        rest = intervals(t_rep, dt) * dt - t_rep
+        for each in range(1, _PARTS + 1):
+            lead = rest * each / dt
+            if abs(lead - round(lead)) <= STEP * each:
+                first = round(lead)
+                # The body stands as it does at the very start, and a path that bends at once would turn it.
+                straight = each if t_rep < INSTANT else first
+                count = max(intervals(t_end - t_rep, dt / each), 1)
+                return cls(count, dt / each, first, each, straight)
+        return cls(max(intervals(t_end - t_rep, dt), 1), dt)
+
+    @property
+    def middles(self) -> Array:
+        """When the scenario's step of each of them is half over, since the first whole one began (T,) [s]."""
+        step = (np.arange(self.count) - self.lead) // self.each
+        return np.asarray((step + 0.5) * (self.dt * self.each))
 
 
 @dataclass(frozen=True)
@@ -52,29 +102,34 @@ class Plan:
             low[-2:], high[-2:] = (0.0, -_WIDEST), (_WHEEL[-1], _WIDEST)
         return np.asarray(np.minimum(np.maximum(rows, low), high))
 
-    def accelerations(self, rows: Array, steps: int, dt: float, a_min: float, a_max: float) -> Array:
-        """Of each step (N, T) [m/s²]."""
-        share = rows[:, : len(_PEDAL) + 1][:, _pieces(_PEDAL, steps, dt)]
-        return np.where(share < 0.0, -share * a_min, share * a_max)
+    def accelerations(self, rows: Array, steps: Steps, begun: float, a_min: float, a_max: float) -> Array:
+        """Of each step (N, T) [m/s²]; ``begun`` is that of the scenario's step that has begun already."""
+        share = rows[:, : len(_PEDAL) + 1][:, _pieces(_PEDAL, steps)]
+        wanted = np.where(share < 0.0, -share * a_min, share * a_max)
+        wanted[:, : steps.lead] = begun
+        return wanted
 
-    def steering(self, rows: Array, steps: int, dt: float) -> Array:
+    def steering(self, rows: Array, steps: Steps) -> Array:
         """Share of the fastest steering in each step (N, T)."""
         begin = len(_PEDAL) + 1
-        piece = np.minimum(_pieces(_WHEEL, steps, dt), len(_WHEEL) - 1)
-        return np.asarray(rows[:, begin : begin + len(_WHEEL)][:, piece])
+        piece = np.minimum(_pieces(_WHEEL, steps), len(_WHEEL) - 1)
+        share = np.asarray(rows[:, begin : begin + len(_WHEEL)][:, piece])
+        share[:, : steps.straight] = 0.0
+        return share
 
-    def tail(self, rows: Array, dt: float) -> Tail:
+    def tail(self, rows: Array, steps: Steps) -> Tail:
         """When the path at an offset is followed."""
-        return Tail(np.rint(rows[:, -2] / dt), rows[:, -1])
+        whole = np.rint(rows[:, -2] / (steps.dt * steps.each)) * steps.each + steps.lead
+        return Tail(np.maximum(whole, steps.straight), rows[:, -1])
 
 
 ALONG, FREE = Plan(False), Plan(True)
 
 
 @lru_cache(maxsize=64)
-def _pieces(ends: tuple[float, ...], steps: int, dt: float) -> npt.NDArray[np.intp]:
+def _pieces(ends: tuple[float, ...], steps: Steps) -> npt.NDArray[np.intp]:
     """Which piece each step belongs to (T,)."""
-    return np.searchsorted(np.array(ends), (np.arange(steps) + 0.5) * dt)
+    return np.searchsorted(np.array(ends), steps.middles)
 
 
 def _pedal(first: float, until: float, then: float) -> Array:

@@ -20,8 +20,8 @@ class ShootingConfig:
     seed: int = setting(0, "of the random numbers; each solve begins with it again", low=0, high=2**31)
     slack: float = setting(
         0.5,
-        "share of the drivability checker's tolerance of the orientation by which the steering may be "
-        "faster than the vehicle's",
+        "share of the drivability checker's tolerances by which the steering may be faster than the "
+        "vehicle's",
         low=0.0,
         high=1.0,
     )

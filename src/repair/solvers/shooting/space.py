@@ -11,6 +11,7 @@ from repair.arrays import Array, Points
 from repair.problem.problem import RepairProblem
 from repair.problem.shapes import Shapes
 from repair.solvers.shooting.motion import Driven
+from repair.solvers.shooting.plans import Steps
 from repair.world.tracks import as_complex
 
 __all__ = ["Space"]
@@ -28,7 +29,7 @@ class Space:
     Attributes
     ----------
     problem : RepairProblem
-    steps : int
+    steps : Steps
         Of a trajectory.
     fine : int
         Looks at each step.
@@ -37,16 +38,16 @@ class Space:
     """
 
     problem: RepairProblem
-    steps: int
+    steps: Steps
     fine: int
     edge: float = 0.0
 
     @cached_property
     def _times(self) -> Array:
         problem = self.problem
-        count = self.steps * self.fine
-        times = problem.t_rep + problem.dt / self.fine * np.arange(1, count + 1)
-        return times[times <= problem.t_end + 0.5 * problem.dt / self.fine]
+        count, between = self.steps.count * self.fine, self.steps.dt / self.fine
+        times = problem.t_rep + between * np.arange(1, count + 1)
+        return times[times <= problem.t_end + 0.5 * between]
 
     @cached_property
     def _rectangles(self) -> Array:
@@ -75,7 +76,7 @@ class Space:
 
     def excess(self, driven: Driven) -> tuple[Array, Array]:
         """How far into obstacles and beyond the road, in metres times looks, and at most in metres (N,)."""
-        s, l, chi, beta = _looks(self.problem, driven, self.fine)  # noqa: E741
+        s, l, chi, beta = _looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
         shown = len(self._times)
         s, l, chi, beta = s[:, :shown], l[:, :shown], chi[:, :shown], beta[:, :shown]  # noqa: E741
         if self.problem.shapes is None:
@@ -105,7 +106,7 @@ class Space:
         shapes = self.problem.shapes
         if shapes is None or shapes.road is None:
             return np.zeros(len(driven.s))
-        s, l, chi, beta = _looks(self.problem, driven, self.fine)  # noqa: E741
+        s, l, chi, beta = _looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
         x, y = shapes.frame.to_cartesian(s, l).reshape(-1, 2).T
         inside = shapes.road.inside(shapes.road.outline(x, y, (shapes.frame.heading(s) + chi - beta).ravel()))
         looks: Array = np.count_nonzero(~inside.reshape(s.shape), axis=1).astype(np.float64)
@@ -162,7 +163,7 @@ def _lost(driven: Driven) -> Array:
     return np.asarray(np.maximum(np.abs(driven.chi) - _ABEAM, 0.0).max(axis=1))
 
 
-def _looks(problem: RepairProblem, driven: Driven, fine: int) -> tuple[Array, Array, Array, Array]:
+def _looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tuple[Array, Array, Array, Array]:
     """s, l, chi and beta (N, T fine) within and at the end of the steps: cubics and lines."""
     x = np.arange(1, fine + 1) / fine
     s, l, v, chi, beta = driven[:5]  # noqa: E741
@@ -170,7 +171,7 @@ def _looks(problem: RepairProblem, driven: Driven, fine: int) -> tuple[Array, Ar
     found: list[Array] = []
     for value, slope in ((s, along), (l, v * np.sin(chi))):
         change = value[:, 1:, None] - value[:, :-1, None]
-        first, last = problem.dt * slope[:, :-1, None], problem.dt * slope[:, 1:, None]
+        first, last = dt * slope[:, :-1, None], dt * slope[:, 1:, None]
         bend = 3.0 * change - 2.0 * first - last
         path = value[:, :-1, None] + x * (first + x * (bend + x * (first + last - 2.0 * change)))
         found.append(path.reshape(len(value), -1))

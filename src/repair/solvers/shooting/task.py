@@ -13,10 +13,9 @@ from repair.deadline import in_time
 from repair.problem.problem import RepairProblem
 from repair.solvers.shooting.curve import curve_along, curve_of
 from repair.solvers.shooting.motion import Car, Driven, drive_along, drive_freely
-from repair.solvers.shooting.plans import Plan, first_along, first_freely
+from repair.solvers.shooting.plans import Plan, Steps, first_along, first_freely
 from repair.solvers.shooting.settings import ShootingConfig
 from repair.solvers.shooting.space import Space
-from repair.timegrid import intervals
 from repair.vehicle.parameters import Vehicle, load_vehicle
 from repair.vehicle.single_track import body_angles
 
@@ -66,11 +65,13 @@ class Task:
     def __init__(self, problem: RepairProblem, config: ShootingConfig) -> None:
         self.problem, self.config = problem, config
         self.iterations = 0
-        self.steps = max(intervals(problem.t_end - problem.t_rep, problem.dt), 1)
+        self.steps = Steps.between(problem.t_rep, problem.t_end, problem.dt)
         shapes = problem.shapes
         vehicle = shapes.vehicle if shapes is not None else load_vehicle()
         limits = problem.limits.reserving(_ROUNDING)
-        self.car = Car(vehicle, limits, problem.curvature_at, problem.dt, config.slack)
+        self.car = Car(
+            vehicle, limits, problem.curvature_at, self.steps.dt, config.slack, each=self.steps.each
+        )
         # A table of the curvature is faster; what is handed over is driven on the axis itself.
         curvature = problem.curvature_at if shapes is None else shapes.frame.curvature
         self.exact = replace(self.car, curvature=curvature, parts=2)
@@ -86,18 +87,18 @@ class Task:
 
     def drive(self, plan: Plan, rows: Array, car: Car) -> Driven:
         """The trajectories (N,) of controls (N, D)."""
-        limits, dt = self.problem.limits, self.problem.dt
-        wanted = plan.accelerations(rows, self.steps, dt, limits.a_min, limits.a_max)
+        limits, begun = self.problem.limits, float(self.problem.start[2, 0])
+        wanted = plan.accelerations(rows, self.steps, begun, limits.a_min, limits.a_max)
         if not plan.steers:
             return drive_along(car, self.start, wanted)
-        turning = plan.steering(rows, self.steps, dt)
-        return drive_freely(car, self.start, wanted, turning, plan.tail(rows, dt))
+        turning = plan.steering(rows, self.steps)
+        return drive_freely(car, self.start, wanted, turning, plan.tail(rows, self.steps))
 
     def curve(self, plan: Plan, shot: Shot) -> Curve:
         """The curve of the best trajectory."""
         driven = self.drive(plan, shot.row, self.exact)
         if not plan.steers:
-            return curve_along(self.problem, driven)
+            return curve_along(self.problem, driven, self.exact)
         return curve_of(self.problem, driven, self.exact)
 
     def search(self, plan: Plan) -> Shot:
