@@ -44,7 +44,7 @@ class Shooting:
         if self.checker.road is not None:  # only to see how far a motion is over the edge
             k = min(round(prepared.conflict.time / self.h), len(self.states) - 1)
             centre = np.array([self.states.x[k], self.states.y[k]])
-            self.shapes = with_standing(self.shapes, no_road(self.checker.road.region, centre, 40.0, 0.0))
+            self.shapes = with_standing(self.shapes, no_road(self.checker.road.region, (), centre, 40.0, 0.0))
         self.stop = min(round(t_end / self.h), count - 1)
         start = self.scene.initial_state
         self.margin = self.checker.config.clearance if kind == "search" else 0.0

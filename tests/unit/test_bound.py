@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,6 +81,28 @@ def test_who_leaves_the_road_has_not_avoided_the_conflict(tmp_path):
             ].time
     assert late[3.5, True] < late[3.5, False] - 0.05
     assert late[20.0, True] == late[20.0, False] == late[3.5, False]
+
+
+def test_what_is_no_road_is_none_and_lanelets_drawn_askew_are_road(tmp_path):
+    import shapely
+
+    from repair.bounds.edges import no_road
+
+    scene = prepared(tmp_path, narrow_road(4.0)).scene
+    lane = scene.scenario.lanelet_network.lanelets[0]
+    road = shapely.Polygon(np.concatenate((lane.right_vertices, lane.left_vertices[::-1])))
+    for margin in (0.0, 0.5):
+        pieces = no_road(road, (), np.array([40.0, 0.0]), 30.0, margin)
+        polygons = shapely.polygons([shapely.linearrings(p) for p in pieces])
+        assert shapely.distance(polygons, road).min() > margin
+        assert shapely.area(polygons).sum() > 0.9 * (60.0**2 - 60.0 * (4.0 + 2 * margin))
+        assert all(shapely.equals(p, p.convex_hull) for p in polygons)
+    other = SimpleNamespace(
+        left_vertices=lane.right_vertices - (0.0, 4.0), right_vertices=lane.right_vertices
+    )
+    pieces = no_road(road, [lane, other], np.array([40.0, 0.0]), 30.0, 0.0)
+    beside = shapely.box(20.0, -5.9, 60.0, -2.1)
+    assert not any(shapely.intersects(shapely.Polygon(piece), beside) for piece in pieces)
 
 
 def test_without_a_conflict_there_is_nothing_to_prove(tmp_path):

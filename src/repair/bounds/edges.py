@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -17,13 +18,15 @@ _COARSE = 0.05  # by how much outlines are simplified [m]
 _INWARDS = 1e-3  # by how much pieces are smaller than what was found to be no road [m]
 
 
-def no_road(region: Any, centre: Array, around: float, margin: float) -> list[Array]:
+def no_road(region: Any, lanelets: Iterable[Any], centre: Array, around: float, margin: float) -> list[Array]:
     """Convex pieces (K, 2) of what is no road, anticlockwise [m].
 
     Parameters
     ----------
     region : shapely geometry
         The road.
+    lanelets : iterable of commonroad.scenario.lanelet.Lanelet
+        Road too for a proof, however they are drawn.
     centre : (2,) array
         Looked at is a square about it [m].
     around : float
@@ -35,7 +38,10 @@ def no_road(region: Any, centre: Array, around: float, margin: float) -> list[Ar
     import shapely
 
     square = shapely.box(*(centre - around), *(centre + around))
-    near = shapely.intersection(region, shapely.buffer(square, 2.0))
+    rings = (np.concatenate((a.left_vertices, a.right_vertices[::-1]))[:, :2] for a in lanelets)
+    drawn = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 2]
+    wide = shapely.buffer(square, 2.0)
+    near = shapely.intersection(shapely.union_all([region, *drawn]), wide)
     kept = shapely.buffer(near, margin + _APART)
     outside = shapely.difference(square, shapely.simplify(shapely.buffer(kept, _COARSE), _COARSE))
     shapely.prepare(kept)

@@ -159,9 +159,9 @@ class _World:
             return []
         k = max(self.end, 0)
         margin = math.sqrt(2.0) * self.checker.config.clearance if kind == "search" else 0.0
-        return no_road(
-            self.checker.road.region, np.array([self.states.x[k], self.states.y[k]]), _AROUND, margin
-        )
+        lanelets = self.scene.scenario.lanelet_network.lanelets
+        centre = np.array([self.states.x[k], self.states.y[k]])
+        return no_road(self.checker.road.region, lanelets, centre, _AROUND, margin)
 
     def instants(self, k: int) -> Array:
         """Samples that are looked at after a reaction at a sample, which is the first of them."""
