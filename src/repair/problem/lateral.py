@@ -1,4 +1,4 @@
-"""Lateral motions past the first obstacle in conflict."""
+"""Lateral motions past the first obstacle in conflict, and the path that is kept where there is none."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 from repair.arrays import Array
 from repair.curves.base import FrenetTrajectory
 from repair.problem.limits import Limits
-from repair.problem.problem import Maneuver
+from repair.problem.problem import Maneuver, RepairProblem
 from repair.problem.surroundings import Surroundings
 from repair.scene.road.bounds import LateralBounds
 
-__all__ = ["LateralProfile", "lateral_profiles", "quintics"]
+__all__ = ["LateralProfile", "aside_at", "kept_path", "lateral_profiles", "quintics"]
+
+_FINE = 0.02  # between the places of the reference that a kept path goes through [s]
 
 
 class LateralProfile(NamedTuple):
@@ -137,3 +139,49 @@ def lateral_profiles(
     return profiles + [
         LateralProfile(*one) for one in zip(kinds, l, rate, acceleration, cost.tolist(), strict=True)
     ]
+
+
+def aside_at(problem: RepairProblem, s: Array, before: float = 0.0) -> Array | None:
+    """Where the reference's path is aside of the frame's axis at ``s`` (K,) [m]; None where it never is.
+
+    Who keeps the path and drives it more slowly is aside by what the reference is at that place, not at that
+    time: else it would slide sideways where it stands.
+
+    Parameters
+    ----------
+    before : float
+        From so long before t_rep on the reference is looked at [s].
+    """
+    since = problem.t_rep - before
+    count = max(int((problem.reference.t_end - since) / _FINE), 2)
+    path = problem.reference.sample(since + _FINE * np.arange(count + 1)).position
+    if not np.count_nonzero(path[:, 1]):
+        return None
+    return np.asarray(np.interp(s, np.maximum.accumulate(path[:, 0]), path[:, 1]))
+
+
+def kept_path(problem: RepairProblem, points: Array, degree: int, spacing: float) -> Array:
+    """The control points of a uniform B-spline with l where the reference's path is, see :func:`aside_at`.
+
+    Those of l are a quasi-interpolant of l(s(t)) (de Boor, *A Practical Guide to Splines*, ch. XII), which is
+    local, so that l rests where s does.
+
+    Parameters
+    ----------
+    problem : RepairProblem
+    points : (n, 2) array
+        ``[s, l]`` [m]; the first ``degree`` rows are the state at t_rep and stay as they are.
+    degree : int
+    spacing : float
+        Of the knots [s].
+    """
+    share = (degree + 1) / 24.0
+    s = points[:, 0].copy()
+    s[1:-1] += share * np.diff(points[:, 0], n=2)  # where the curve is when each point acts
+    aside = aside_at(problem, s, degree * spacing)
+    if aside is None:
+        return points
+    bend = np.diff(aside, n=2, append=2.0 * aside[-1] - aside[-2])
+    found = points.copy()
+    found[degree:, 1] = aside[degree:] - share * bend[degree - 1 :]
+    return found

@@ -118,7 +118,7 @@ class RepairProblem:
     half_length : float
         Half the length of the ego's body [m]; its position is that of the middle.
     lateral : bool
-        Whether the backend may move sideways; if not, l stays on the reference.
+        Whether the backend may move sideways; if not, it stays on the path of the reference.
     strict : bool
         No part of the margin may be given up, whatever the checker says of the true rectangles.
     shapes : Shapes or None

@@ -27,6 +27,7 @@ from repair.curves.base import Curve
 from repair.curves.bernstein import BernsteinCurve
 from repair.deadline import OutOfTime, in_time, until
 from repair.errors import BackendError
+from repair.problem.lateral import aside_at
 from repair.problem.problem import RepairProblem
 
 __all__ = ["QptrBackend", "make"]
@@ -205,6 +206,10 @@ def _solution(
         points[:, axis] = x
     points[:, 0] += problem.start[0, 0]
     if not problem.lateral and np.count_nonzero(tasks[1]):  # most references are the path itself
+        driven = BernsteinCurve(problem.t_rep, s.duration, points.reshape(s.pieces, -1, 2))
+        aside = aside_at(problem, driven.sample(problem.t_rep + s.nodes).position[:, 0])
+        if aside is not None:
+            tasks[1, 3:] = aside
         x = s.follow @ tasks[1]
         objective += qp.objective(qp.judged[count:] @ x, tasks[1])
         points[:, 1] = x

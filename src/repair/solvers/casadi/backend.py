@@ -166,6 +166,7 @@ class CasadiBackend:
             low, high = instance.bounds(separation, points, trust)
             try:
                 points, status, word, count = self._run(instance, points, low, high, deadline)
+                points = instance.on_path(points)
             except OutOfTime as over:  # what there is may do
                 status, word, count = SolveStatus.TIME_LIMIT, "", 0
                 cut = _cut(time_limit, over)

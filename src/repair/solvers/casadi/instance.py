@@ -11,6 +11,7 @@ from repair.curves.base import Curve
 from repair.curves.bspline import greville_offsets
 from repair.curves.fitting import fit_to_curve, splice_points
 from repair.curves.sampled import SampledCurve
+from repair.problem.lateral import kept_path
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.model import Model
@@ -138,6 +139,14 @@ class Instance:
         p, axes = self.model.structure.degree, self.model.structure.axes
         slope = self.model.hessian[p:, :p] @ self.head - self.pulled[p:]
         return np.asarray(slope[:, :axes].T.ravel())
+
+    def on_path(self, points: Array) -> Array:
+        """Control points less the origin with l where the reference's path is, for who keeps to that."""
+        problem, structure = self.problem, self.model.structure
+        if problem.lateral:
+            return points
+        found = kept_path(problem, points + self.origin, structure.degree, structure.spacing) - self.origin
+        return points if np.array_equal(found[:, 1], points[:, 1]) else found
 
     def _windows(self) -> Windows:
         """The windows that begin before the end of the repair."""
@@ -291,4 +300,5 @@ def lay_out(problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
     points[:p] = head
     if not problem.lateral and problem.passing is not None:
         points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
-    return Instance(problem, model, origin, head), points
+    instance = Instance(problem, model, origin, head)
+    return instance, instance.on_path(points)

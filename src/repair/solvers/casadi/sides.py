@@ -88,7 +88,7 @@ def open_sides(instance: Instance, points: Array) -> Opening:
         low, high = instance.bounds(separation, None)
         x, possible = (None, False) if gap else model.presolve(model.unknowns(points), slope, low, high)
         if x is not None:
-            points = instance.relaxed = model.with_unknowns(points, x)
+            points = instance.relaxed = instance.on_path(model.with_unknowns(points, x))
         if possible:
             return Opening(separation, points, "", closest)
         modest = instance.bounds(separation, None, modest=True)
@@ -96,7 +96,7 @@ def open_sides(instance: Instance, points: Array) -> Opening:
         if elastic is None:
             why = why or "no curve from the start state keeps the limits and the road"
             return Opening(separation, points, why, closest)
-        points = model.with_unknowns(points, elastic[0])
+        points = instance.on_path(model.with_unknowns(points, elastic[0]))
         if closest is None or elastic[1] < closest[1]["obstacles"]:
             closest = points, residuals_of(instance, separation, points) | {"obstacles": float(elastic[1])}
         why = why or _missed(instance, separation, points, elastic[1])

@@ -13,16 +13,17 @@ import time
 
 import numpy as np
 
-from repair.arrays import Array
+from repair.arrays import Array, frozen
 from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
 from repair.curves.bases import fitted_knots
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime
+from repair.problem.lateral import kept_path
 from repair.problem.problem import RepairProblem
 from repair.solvers.ego.cost_structure import SIZES, Sizes
-from repair.solvers.ego.minimise import Minimiser
+from repair.solvers.ego.minimise import Minimiser, Minimum
 from repair.solvers.ego.pairs import closest_distance
 from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.ego.stages import Stages
@@ -108,7 +109,7 @@ class EgoBackend:
                 detail=f"time limit of {time_limit:g} s",
             )  # fmt: skip
         curves = {
-            name: UniformBSpline(problem.t_rep, spacing, self.degree, _standing(minimum.points, self.degree))
+            name: UniformBSpline(problem.t_rep, spacing, self.degree, self._driven(problem, minimum, spacing))
             for name, minimum in (("deformation", deformed), ("refinement", refined))
         }
         converged = deformed.converged and refined.converged
@@ -123,6 +124,10 @@ class EgoBackend:
             f"refinement {refined.iterations}",
             stages=curves,
         )
+
+    def _driven(self, problem: RepairProblem, minimum: Minimum, spacing: float) -> Array:
+        points = _standing(minimum.points, self.degree)
+        return points if problem.lateral else frozen(kept_path(problem, points, self.degree, spacing))
 
 
 def make(config: Configuration) -> EgoBackend:

@@ -1,0 +1,57 @@
+"""Who keeps the path of a reference that is not on the frame's axis keeps to it by place, not by time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import roads
+
+import repair
+from repair.problem.lateral import aside_at, kept_path
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """Return a straight road, and nobody on it."""
+    file = tmp_path_factory.mktemp("road") / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(roads.scenario(), encoding="utf-8")
+    return repair.load_scene(file)
+
+
+def winding(scene):
+    """A plan that swings by a few centimetres about the middle of the road."""
+    t = np.arange(0.0, 4.0 + 1e-9, scene.dt)
+    x = scene.initial_state.x + scene.initial_state.velocity * t
+    y = scene.initial_state.y + 0.05 * (1.0 - np.cos(2.0 * np.pi * (x - x[0]) / 9.0))
+    return np.column_stack([t, x, y])
+
+
+def wall(scene, ahead):
+    """All across the road: there is nothing but to stop."""
+    place = [scene.initial_state.x + ahead, scene.initial_state.y, 0.0]
+    return repair.Prediction(7, np.tile(place, (41, 1)), 1.0, 3.4)
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
+def test_who_stands_does_not_slide(scene, backend):
+    watch = repair.Repairer(scene, backend=backend, overrides=["repair.lateral=none"])
+    cycle = watch.update(winding(scene), traffic=[wall(scene, 27.0)])
+    assert cycle.status == "found"
+    assert cycle.f_ttr > 0.0
+    t = np.arange(cycle.f_ttr, cycle.prepared.t_end, 0.01)
+    reference = cycle.prepared.reference.sample(np.arange(0.0, 4.0, 0.01)).position
+    assert np.ptp(reference[:, 1]) > 0.02  # else nothing is seen here
+    driven = cycle.curve.sample(t)
+    path = np.interp(driven.position[:, 0], reference[:, 0], reference[:, 1])
+    assert np.abs(driven.position[:, 1] - path).max() < 0.012
+    standing = driven.velocity[:, 0] < 1e-4
+    assert standing.any()
+    assert np.abs(driven.velocity[standing, 1]).max() < 0.01  # a standstill to every check
+
+
+def test_a_reference_on_the_axis_changes_nothing(scene):
+    prepared = repair.repair(scene, overrides=["reference.source=constant"]).prepared
+    problem = prepared.source.plain(0.4)
+    points = np.column_stack([np.linspace(0.0, 20.0, 12), np.zeros(12)])
+    assert aside_at(problem, points[:, 0]) is None
+    assert kept_path(problem, points, 3, 0.4) is points
