@@ -90,6 +90,8 @@ def _searched(path: Path, settings: Settings, found: Examined, judged: bool = Tr
                 continue
             clean = judge is not None and judge.result(result, backend, reference)
             verified = clean and result.status.value == "found"
+            if result.search.best is not None and result.search.best.fallback:
+                found.counts[f"by a fallback of {backend}"] += 1
             yield Row(
                 backend,
                 reference,

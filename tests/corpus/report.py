@@ -71,6 +71,7 @@ def report(examined: Sequence[Examined]) -> str:
     n, of, share, most = _shares(examined)["agreement"]
     m, again, off, limit = _shares(examined)["invariance"]
     by = ", ".join(f"{backend} {count}" for backend, count in sorted(told.items())) or "none"
+    instead = {k: n for k, n in sorted(counts.items()) if k.startswith("by a fallback")}
     lines = [
         _answers(examined),
         "",
@@ -78,7 +79,8 @@ def report(examined: Sequence[Examined]) -> str:
         f"Looked at    {counts['contact times']} contact times of references, {counts['road verdicts']} "
         f"verdicts about the road, {counts['official checks']} solution files by CommonRoad's checks",
         f"Agreement    {n} of {of} searches ({share:.1f} %, at most {most:g} %) find nothing where another "
-        f"backend's repair is verified ({by}; for {counts['repairable']} one is)",
+        f"backend's repair is verified ({by}; for {counts['repairable']} one is, "
+        f"{sum(instead.values())} of these {', '.join(f'{k}: {n}' for k, n in instead.items()) or '-'})",
         f"Invariance   {m} of {again} searches ({off:.1f} %, at most {limit:g} %) end otherwise when moved, "
         "turned or mirrored"
         + "".join(f"; {counts[f'not {c}']} files not {c}" for c in CHANGES if counts[f"not {c}"]),

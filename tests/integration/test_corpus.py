@@ -154,13 +154,17 @@ def test_a_trajectory_into_an_obstacle(file: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_backends_that_do_not_agree(file: Path) -> None:
-    """``ego`` without time for a single probe."""
+    """One that finds nothing; where others may be asked instead, they agree."""
     found = examine(file, Settings(("ego", "casadi"), ("constant",), invariance=False))
     assert violated([found]) == []
-    few = examine(file, Settings(("casadi", "worthless"), ("constant",), invariance=False))
+    alone = Settings(("casadi", "worthless"), ("constant",), invariance=False, overrides=("fallback=[]",))
+    few = examine(file, alone)
     assert violated([few]) == ["agreement"]
     assert "worthless 1" in report([few])
     assert "not solved on purpose" in report([few])
+    helped = examine(file, replace(alone, overrides=()))
+    assert violated([helped]) == []
+    assert "1 of these by a fallback of worthless: 1" in report([helped])
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -487,7 +487,10 @@ def test_what_a_file_sets_for_another_source_may_stand_there(tmp_path):
         ),
         (["casadi.rounds=3"], [("casadi.rounds", "backend", "ego")]),
         (["backend=casadi", "casadi.rounds=3"], []),
-        (["backend=casadi", "ego.deform.smooth=3"], [("ego.deform.smooth", "backend", "casadi")]),
+        (["backend=casadi", "ego.deform.smooth=3"], []),  # ego helps
+        (["backend=casadi", "qptr.spacing=0.5"], [("qptr.spacing", "backend", "casadi")]),
+        (["backend=qptr", "ego.deform.smooth=3"], []),  # it may have to find what qptr does not
+        (["backend=qptr", "ego.deform.smooth=3", "fallback=[]"], [("ego.deform.smooth", "backend", "qptr")]),
         (["ego.precondition=false"], [("ego.precondition", "ego.solver", "newton")]),
         (["ego.precondition=false", "ego.solver=lbfgs"], []),
         (

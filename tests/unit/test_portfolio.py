@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -182,6 +183,60 @@ def test_results_name_the_backend_and_are_certified(tmp_path):
         result.save(tmp_path, figure=False)
         certificate = certify(tmp_path)
     assert [row.name for row in certificate.rows if row.claim and not row.ok] == []
+
+
+def alone(first, *others, **keys):
+    """The search by one backend that has fallbacks."""
+    source = Source()
+    situation = SimpleNamespace(
+        source=source, unguided=source, judge=Checker(), conflict=Conflict(2.0, "margin", contact_time=2.0)
+    )
+    named = {other.name: other for other in others}
+    first.capabilities = replace(first.capabilities, fallbacks=lambda: named)
+    told = []
+    settings = SearchConfig(rule="scan", delta_t=STEP)
+    found = search_with(first, first.name, situation, settings, on_probe=told.append, **keys)
+    assert [probe.t_rep for probe in told] == [probe.t_rep for probe in found.probes]
+    return found, capabilities_of(first, found)
+
+
+def test_a_fallback_is_asked_where_nothing_is_found_and_says_so():
+    second, third = Member("second", 0.7, jumps=True), Member("third", 1.5)
+    found, can = alone(Member("first", -1.0), Member("none", -1.0), second, third)
+    assert found.f_ttr == pytest.approx(0.7)
+    assert (found.best.by, found.best.fallback) == ("second", True)
+    assert can.jumps
+    assert can.fallbacks is None
+    assert third.asked == []
+    assert [probe.by for probe in found.probes[:1]] == [""]
+
+
+def test_no_fallback_is_asked_where_something_is_found_or_the_times_are_given():
+    second = Member("second", 1.9)
+    found, _ = alone(Member("first", 0.1), second)
+    assert found.f_ttr == pytest.approx(0.1)
+    assert not found.best.fallback
+    missed, can = alone(Member("first", -1.0), second, visits=[0.5])
+    assert missed.status is SearchStatus.NONE_FEASIBLE
+    assert not can.jumps
+    assert second.asked == []
+
+
+def test_no_fallback_finds_anything():
+    found, _ = alone(Member("first", -1.0), Member("first", 1.9), Member("second", -1.0))
+    assert found.status is SearchStatus.NONE_FEASIBLE
+    assert {probe.by for probe in found.probes} == {"", "second"}
+
+
+def test_settings_of_those_who_may_be_asked_have_an_effect():
+    def idle(*overrides, backend="qptr"):
+        return {key for key, *_ in load_config(backend=backend, overrides=list(overrides)).without_effect()}
+
+    assert idle("shooting.seed=1", "casadi.solver=sqpmethod") == {"casadi.solver"}
+    assert idle("shooting.seed=1", "fallback=[]") == {"shooting.seed"}
+    assert idle("casadi.solver=sqpmethod", "fallback=[portfolio]") == set()
+    assert idle("qptr.solver=osqp", "shooting.seed=1", "fallback=[]", backend="portfolio") == set()
+    assert idle("shooting.seed=1", "fallback=[]", backend="casadi") == set()
 
 
 def test_a_violation_of_one_member_does_not_end_the_search():

@@ -50,7 +50,10 @@ def test_the_end_of_the_road_is_yielded_to(tmp_path: Path, backend: str, left: f
 
 def test_without_the_setting_nobody_brakes(tmp_path: Path) -> None:
     scene = loaded(tmp_path, roads.strip(1, straight(-50.0, 50.0)), 12.0, 8.0)
-    assert answer(scene, "casadi", "repair.road_ends=false").status.value == "none_feasible"
+    assert answer(scene, "ego", "repair.road_ends=false", "fallback=[]").status.value == "none_feasible"
+    other = answer(scene, "ego", "repair.road_ends=false")  # shooting sees the road itself
+    assert other.status.value == "found"
+    assert other.search.best.by == "shooting"
     noted = answer(scene, "ego", "checker.road=false", "repair.road_ends=true")
     assert any("repair.road_ends has no effect" in note for note in noted.prepared.notes)
     assert noted.status.value == "no_conflict"

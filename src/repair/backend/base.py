@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Protocol
@@ -72,6 +72,8 @@ class Capabilities:
         ``warm_start``.
     members : callable or None
         Makes the backends that it is made of, by name: the search makes a search of each.
+    fallbacks : callable or None
+        Makes the backends that the search asks, one after the other, where it ends without a repair.
     """
 
     relaxes: bool = False
@@ -81,6 +83,7 @@ class Capabilities:
     jumps: bool = False
     helpers: tuple[Callable[[], RepairBackend], ...] = ()
     members: Callable[[], Mapping[str, RepairBackend]] | None = None
+    fallbacks: Callable[[], Mapping[str, RepairBackend]] | None = None
 
 
 @dataclass(frozen=True)
@@ -182,6 +185,11 @@ class Configuration(Protocol):
     @property
     def repair(self) -> RepairConfig:
         """The repair problem, the same for every backend."""
+        ...
+
+    @property
+    def fallback(self) -> Sequence[str]:
+        """Names of the backends that are asked where a search ends without a repair."""
         ...
 
     def section(self, name: str) -> Any:

@@ -41,6 +41,13 @@ class Config:
         choices=("f_ttr", "at_ttr"),
     )
     backend: str = setting("ego", "ego, casadi, qptr, shooting, portfolio, or one that is registered")
+    fallback: list[str] = setting(
+        factory=lambda: ["ego", "shooting"],
+        says="backends that are asked, in this order, where the search ends without a repair; the result "
+        "says whose it is",
+        registry="backend",
+        only_with=("driver", ("f_ttr",)),
+    )
     metrics: list[str] = setting(
         factory=list, says="metrics of the reference that the result is to hold", registry="metric"
     )
@@ -87,10 +94,23 @@ class Config:
                 yield key.name, needed[0], str(values[needed[0]])
         for key in _keys():
             owner = key.name.split(".", 1)[0]
-            if key.name in self.given and owner in backend_names() and owner != self.backend:
+            if key.name in self.given and owner in backend_names() and owner not in self._asked():
                 yield key.name, "backend", self.backend
             if key.name in self.given and owner == "evasive" and not self.metrics and self.driver == "f_ttr":
                 yield key.name, "metrics", "[]"
+
+    def _asked(self) -> set[str]:
+        """Names of all backends that may have a say."""
+        asked: set[str] = set()
+        further = [self.backend, *(self.fallback if self.driver == "f_ttr" else ())]
+        while further:
+            name = further.pop()
+            if name in asked or name not in backend_names():
+                continue
+            asked.add(name)
+            spec = BACKENDS[name]
+            further += [*spec.helpers, *(getattr(self.section(name), spec.members) if spec.members else ())]
+        return asked
 
     def __new__(cls, *args: Any, **keys: Any) -> Config:
         """Made as its full type, with the sections of all backends."""

@@ -161,6 +161,7 @@ _OTHERS: dict[str, Test] = {
     "drawing_file": _maybe(_text),
     "checks_off": _list_of(_text),
     "repaired_by": _maybe(_text),
+    "by_fallback": _maybe(_flag),
     "checked_until_s": _maybe(_number),
     "prediction_end": _maybe(_table_of(_number)),
     "onward": _maybe(_all_of({"kind": _text, "reached": _flag, "sentence": _text, "tried": _whole})),

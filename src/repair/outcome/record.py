@@ -108,6 +108,7 @@ def record_of(
             "place_m": place_of(conflict.place),
         },
         "repaired_by": _by(prepared, best) if best is not None else None,
+        "by_fallback": best.fallback if best is not None else None,
         "bound": bound_to_dict(prepared, found, bounds or {}),
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "modes": [_mode(mode) for mode in modes],

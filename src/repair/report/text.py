@@ -118,6 +118,7 @@ def _f_ttr(content: dict[str, Any]) -> str:
         how = f", {content['maneuver'].replace('_', ' ')}" if content["maneuver"] else ""
         if content.get("repaired_by") not in (None, content["backend"]):
             how += f", found by {content['repaired_by']}"
+            how += f" ({content['backend']} finds nothing)" if content.get("by_fallback") else ""
         return f"{content['f_ttr_s']:.2f} s{how}"
     return "unlimited: there is nothing to react to" if content["status"] == "no_conflict" else "none"
 

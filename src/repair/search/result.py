@@ -18,8 +18,9 @@ __all__ = ["Probe", "SearchResult", "SearchStatus"]
 class Probe:
     """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said.
 
-    Where several backends are asked, ``by`` is the one that was; ``jump`` is by how much the acceleration was
-    made to differ from that of the reference where the repair begins [m/s²].
+    Where several backends are asked, ``by`` is the one that was, and ``fallback`` whether it was asked
+    because the search had ended without a repair; ``jump`` is by how much the acceleration was made to
+    differ from that of the reference where the repair begins [m/s²].
     """
 
     t_rep: float
@@ -31,6 +32,7 @@ class Probe:
     margin: float | None = None
     by: str = ""
     jump: float = 0.0
+    fallback: bool = False
 
     @property
     def feasible(self) -> bool:

@@ -1,4 +1,7 @@
-"""The search by one backend, or by several: each is asked only for what those before it have left open."""
+"""The search by one backend, or by several: each is asked only for what those before it have left open.
+
+Where a search ends without a repair, its fallbacks are asked.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from repair.backend.base import Capabilities, RepairBackend
 from repair.backend.guard import Guarded
@@ -34,7 +38,8 @@ def search_with(
 
     The first member is asked as if it were alone. Each further one starts from the latest repair that was
     verified so far, if it can, and is asked for later ones only; where there is none, as if it were alone.
-    So a repair is found wherever one of them finds one.
+    So a repair is found wherever one of them finds one. A search of all times-to-repair that ends without a
+    repair is made again by each of the fallbacks, until one finds one.
 
     Parameters
     ----------
@@ -57,6 +62,43 @@ def search_with(
     BackendError
         If a backend raises, or what it answers is no answer.
     """
+    found = _search_with(backend, name, situation, settings, around, visits, too_late, on_probe)
+    fallbacks = backend.capabilities.fallbacks
+    if fallbacks is None or visits is not None or found.status is not SearchStatus.NONE_FEASIBLE:
+        return found
+    asked = {name, *(backend.capabilities.members or dict)()}
+    for each, other in fallbacks().items():
+        if each in asked or found.status is not SearchStatus.NONE_FEASIBLE:
+            continue
+        left = None if settings.time_limit is None else max(settings.time_limit - found.wall_time, 0.0)
+        again = search_f_ttr(
+            around or (situation.unguided if other.capabilities.own_way else situation.source),
+            situation.conflict, Guarded(other, each), situation.judge, replace(settings, time_limit=left),
+            on_probe=None if on_probe is None else partial(_told, on_probe, each),
+        )  # fmt: skip
+        found = replace(
+            again,
+            probes=(*found.probes, *(replace(probe, by=each, fallback=True) for probe in again.probes)),
+            wall_time=found.wall_time + again.wall_time,
+        )
+    return found
+
+
+def _told(on_probe: Callable[[Probe], None], by: str, probe: Probe) -> None:
+    on_probe(replace(probe, by=by, fallback=True))
+
+
+def _search_with(
+    backend: RepairBackend,
+    name: str,
+    situation: Situation,
+    settings: SearchConfig,
+    around: ProblemSource | None,
+    visits: Sequence[float] | None,
+    too_late: Callable[[], float] | None,
+    on_probe: Callable[[Probe], None] | None,
+) -> SearchResult:
+    """As :func:`search_with`, without fallbacks."""
 
     def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
         own = situation.unguided if one.capabilities.own_way else situation.source
@@ -115,7 +157,10 @@ def _open(visits: Sequence[float] | None, best: Probe, settings: SearchConfig, e
 
 def capabilities_of(backend: RepairBackend, found: SearchResult) -> Capabilities:
     """What the backend behind an answer is able to do, as plain data: the member whose repair it is."""
-    can, best = backend.capabilities, found.best
-    if can.members is not None and best is not None and best.by:
-        can = can.members()[best.by].capabilities
-    return replace(can, helpers=(), members=None)
+    can, by = backend.capabilities, found.best.by if found.best is not None else ""
+    for others in (can.members, can.fallbacks):
+        made = others() if others is not None and by else {}
+        if by in made:
+            can = made[by].capabilities
+            break
+    return replace(can, helpers=(), members=None, fallbacks=None)

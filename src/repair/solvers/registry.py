@@ -157,6 +157,9 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
     if spec.members:
         names = getattr(config.section(name), spec.members)
         made.capabilities = replace(made.capabilities, members=_members(names, config))
+    others = [each for each in config.fallback if each != name]
+    if others:
+        made.capabilities = replace(made.capabilities, fallbacks=_members(others, config))
     return made
 
 

@@ -11,7 +11,7 @@ __all__ = ["COLUMNS", "SweepSettings", "combinations", "failed_row", "one_line"]
 COLUMNS = (
     "file", "backend", "reference", "status", "detail", "conflict", "margin_only", "obstacle_id",
     "from_behind", "ttc_s", "contact_ttc_s", "checked_until_s", "decided_by", "f_ttr_s", "ttb_s", "ttr_s",
-    "maneuver", "repaired_by",
+    "maneuver", "repaired_by", "by_fallback",
     "peak_deceleration_mps2", "peak_acceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps",
     "ending", "ending_maneuver", "ending_detail", "onward", "onward_reached", "onward_detail",
     "largest_residual", "probes", "official_feasible", "official_collision_free", "official_on_road",
