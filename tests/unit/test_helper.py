@@ -87,7 +87,7 @@ def search(backend, source=None, latest=1.2, **keys):
 
 def test_what_the_helper_found_is_handed_over_and_the_answer_is_the_backends_own():
     source = Source()
-    found = search(Hard(Capabilities(helpers=(Soft,))), source)
+    found = search(Hard(Capabilities(helpers={"soft": Soft})), source)
     assert found.f_ttr == pytest.approx(1.2)  # where the helper's curves end to be accepted
     best = found.best
     assert best.margin == pytest.approx(toy.problem(()).margin - 0.25)
@@ -103,16 +103,16 @@ def test_what_the_helper_found_is_handed_over_and_the_answer_is_the_backends_own
 def test_without_a_helper_or_with_a_strict_problem_nobody_is_asked():
     assert search(Hard(Capabilities())).f_ttr is None
     source = Source(strict=True)
-    assert search(Hard(Capabilities(helpers=(Soft,))), source).f_ttr is None
+    assert search(Hard(Capabilities(helpers={"soft": Soft})), source).f_ttr is None
     assert not source.along_asked
 
 
 def test_a_helpers_curve_is_no_answer_by_itself_and_the_reason_is_said():
-    found = search(Hard(Capabilities(helpers=(Soft,)), near=False))
+    found = search(Hard(Capabilities(helpers={"soft": Soft}), near=False))
     assert found.f_ttr is None
     assert "from a curve of soft that passes every check: no gap" in found.probes[0].solve.detail
     nothing = search(
-        Hard(Capabilities(helpers=(Soft,))), latest=-1.0
+        Hard(Capabilities(helpers={"soft": Soft})), latest=-1.0
     )  # the checker accepts none of its curves
     assert nothing.f_ttr is None
     assert all("soft" not in text for probe in nothing.probes for text in probe.tried)
@@ -122,7 +122,10 @@ def test_without_time_to_make_the_helper_the_search_goes_on_without():
     def late():
         raise OutOfTime("importing takes long")
 
-    found, alone = search(Hard(Capabilities(helpers=(late,))), time_limit=100.0), search(Hard(Capabilities()))
+    found, alone = (
+        search(Hard(Capabilities(helpers={"late": late})), time_limit=100.0),
+        search(Hard(Capabilities())),
+    )
     assert found.complete
     assert [probe.t_rep for probe in found.probes] == [probe.t_rep for probe in alone.probes]
     assert found.probes[0].tried[-1] == "no other backend asked: importing takes long"
@@ -130,13 +133,13 @@ def test_without_time_to_make_the_helper_the_search_goes_on_without():
 
 def test_the_registry_makes_the_helper_once_and_when_it_is_asked_for():
     backend = make_backend("casadi", load_config(backend="casadi", overrides=["shooting.seed=4"]))
-    soft, helper = (make() for make in backend.capabilities.helpers)
+    soft, helper = (make() for make in backend.capabilities.helpers.values())
     assert soft.name == "ego"
     assert helper.name == "shooting"
     assert helper.config.seed == 4
-    assert backend.capabilities.helpers[1]() is helper
-    assert CasadiBackend.capabilities.helpers == ()
-    assert make_backend("ego", load_config()).capabilities.helpers == ()
+    assert backend.capabilities.helpers["shooting"]() is helper
+    assert CasadiBackend.capabilities.helpers == {}
+    assert make_backend("ego", load_config()).capabilities.helpers == {}
 
 
 # ------------------------------------------------------------------ what casadi makes of a verified curve

@@ -185,6 +185,19 @@ def test_results_name_the_backend_and_are_certified(tmp_path):
     assert [row.name for row in certificate.rows if row.claim and not row.ok] == []
 
 
+def test_a_member_does_without_the_help_of_who_was_asked_before():
+    """It has said no already; who was not asked still helps."""
+    made = []
+
+    def helper(name):
+        return lambda: made.append(name) or Member(name, -1.0)
+
+    hard = Member("hard", -1.0, helpers={name: helper(name) for name in ("cheap", "other")})
+    found, _ = asked(Member("cheap", 0.5), hard)
+    assert found.f_ttr == pytest.approx(0.5)
+    assert set(made) == {"other"}
+
+
 def alone(first, *others, **keys):
     """The search by one backend that has fallbacks."""
     source = Source()

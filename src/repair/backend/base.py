@@ -66,7 +66,7 @@ class Capabilities:
         without a guide (``problem.passing`` is None), and with the true shapes (``problem.shapes``).
     jumps : bool
         The acceleration of its curves may jump, at t_rep too, as an input of the vehicle's model may.
-    helpers : tuple of callable
+    helpers : mapping of str to callable
         Each makes a backend that the search asks where this one has found nothing, one after the other. If
         the checker accepts a curve of it, this one is asked again, with that curve as guide and
         ``warm_start``.
@@ -81,7 +81,7 @@ class Capabilities:
     uses_warm_start: bool = False
     own_way: bool = False
     jumps: bool = False
-    helpers: tuple[Callable[[], RepairBackend], ...] = ()
+    helpers: Mapping[str, Callable[[], RepairBackend]] = field(default_factory=dict)
     members: Callable[[], Mapping[str, RepairBackend]] | None = None
     fallbacks: Callable[[], Mapping[str, RepairBackend]] | None = None
 

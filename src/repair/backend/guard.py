@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from dataclasses import replace
 from numbers import Integral, Real
 from typing import Any
 
@@ -27,11 +28,14 @@ class Guarded:
     backend : RepairBackend
     name : str
         By which it was asked for.
+    without : container of str
+        Helpers that it has to do without.
     """
 
-    def __init__(self, backend: RepairBackend, name: str) -> None:
+    def __init__(self, backend: RepairBackend, name: str, without: Container[str] = ()) -> None:
         self.backend, self.name = backend, name
-        self.capabilities = backend.capabilities
+        helpers = {k: make for k, make in backend.capabilities.helpers.items() if k not in without}
+        self.capabilities = replace(backend.capabilities, helpers=helpers)
 
     def solve(
         self,

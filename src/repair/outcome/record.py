@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -139,7 +139,10 @@ def record_of(
 
 
 def _plain(capabilities: Capabilities) -> dict[str, Any]:
-    return {name: can for name, can in asdict(capabilities).items() if name not in ("helpers", "members")}
+    made = ("helpers", "members", "fallbacks")
+    return {
+        item.name: getattr(capabilities, item.name) for item in fields(capabilities) if item.name not in made
+    }
 
 
 def _beyond(beyond: Beyond | None) -> dict[str, Any] | None:

@@ -170,7 +170,8 @@ def _helped(
     A hard backend gives up where its guides or its boxes leave it nothing; what has been verified proves that
     there is a way. The helper's curve itself is no answer: it may keep less than this backend claims.
     """
-    for make in backend.capabilities.helpers if not any(problem.strict for problem in first) else ():
+    helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
+    for make in helpers.values():
         if probe.feasible or budget.spent:
             break
         try:

@@ -103,7 +103,7 @@ def _search_with(
     def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
         own = situation.unguided if one.capabilities.own_way else situation.source
         return search_f_ttr(
-            around or own, situation.conflict, Guarded(one, name), situation.judge, settings,
+            around or own, situation.conflict, Guarded(one, name, done), situation.judge, settings,
             visits=visits, on_probe=on_probe if several is None else by(name), after=best,
         )  # fmt: skip
 
@@ -115,7 +115,7 @@ def _search_with(
 
         return visited
 
-    several, probes = backend.capabilities.members, list[Probe]()
+    several, probes, done = backend.capabilities.members, list[Probe](), set[str]()
     if several is None:
         return ask(name, backend, settings, None)
     begin, complete, best = time.perf_counter(), True, None
@@ -132,6 +132,7 @@ def _search_with(
         upper = end if settings.upper is None else min(end, settings.upper)
         now = replace(settings, time_limit=limit, upper=upper if math.isfinite(upper) else None)
         found = ask(each, member, now, best)
+        done.add(each)  # whoever comes next need not ask it for help: it has said no
         if found.status in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING):
             return found
         best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
@@ -163,4 +164,4 @@ def capabilities_of(backend: RepairBackend, found: SearchResult) -> Capabilities
         if by in made:
             can = made[by].capabilities
             break
-    return replace(can, helpers=(), members=None, fallbacks=None)
+    return replace(can, helpers={}, members=None, fallbacks=None)

@@ -152,7 +152,7 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
             f"backend {name!r} declares no capabilities; it needs an attribute capabilities = Capabilities()"
         )
     if spec.helpers:
-        helpers = tuple(_helper(each, config) for each in spec.helpers)
+        helpers = {each: _helper(each, config) for each in spec.helpers}
         made.capabilities = replace(made.capabilities, helpers=helpers)
     if spec.members:
         names = getattr(config.section(name), spec.members)
