@@ -185,17 +185,17 @@ def test_results_name_the_backend_and_are_certified(tmp_path):
     assert [row.name for row in certificate.rows if row.claim and not row.ok] == []
 
 
-def test_a_member_does_without_the_help_of_who_was_asked_before():
-    """It has said no already; who was not asked still helps."""
-    made = []
-
-    def helper(name):
-        return lambda: made.append(name) or Member(name, -1.0)
-
-    hard = Member("hard", -1.0, helpers={name: helper(name) for name in ("cheap", "other")})
-    found, _ = asked(Member("cheap", 0.5), hard)
+def test_a_helper_is_not_asked_again_where_it_found_nothing_as_a_member():
+    """Who was no member, or was not asked for this time, still helps."""
+    helpers = {name: Member(name, -1.0) for name in ("cheap", "other")}
+    hard = Member("hard", -1.0, helpers={name: lambda one=one: one for name, one in helpers.items()})
+    cheap = Member("cheap", 0.5)
+    found, _ = asked(cheap, hard)
     assert found.f_ttr == pytest.approx(0.5)
-    assert set(made) == {"other"}
+    refused = {t for t in cheap.asked if t > 0.55}
+    assert refused & set(hard.asked)
+    assert set(helpers["other"].asked) == set(hard.asked)
+    assert set(helpers["cheap"].asked) == set(hard.asked) - refused
 
 
 def alone(first, *others, **keys):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Any
 
@@ -28,14 +27,11 @@ class Guarded:
     backend : RepairBackend
     name : str
         By which it was asked for.
-    without : container of str
-        Helpers that it has to do without.
     """
 
-    def __init__(self, backend: RepairBackend, name: str, without: Container[str] = ()) -> None:
+    def __init__(self, backend: RepairBackend, name: str) -> None:
         self.backend, self.name = backend, name
-        helpers = {k: make for k, make in backend.capabilities.helpers.items() if k not in without}
-        self.capabilities = replace(backend.capabilities, helpers=helpers)
+        self.capabilities = backend.capabilities
 
     def solve(
         self,

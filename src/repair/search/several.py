@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from repair.backend.base import Capabilities, RepairBackend
+from repair.backend.base import Capabilities, RepairBackend, SolveResult, SolveStatus
 from repair.backend.guard import Guarded
+from repair.curves.base import Curve
+from repair.problem.problem import RepairProblem
 from repair.search.probe import ProblemSource
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
@@ -84,6 +86,46 @@ def search_with(
     return found
 
 
+class _Unaided(Guarded):
+    """A backend whose helpers are not asked again where they have found nothing by themselves.
+
+    Parameters
+    ----------
+    backend : RepairBackend
+    name : str
+        By which it was asked for.
+    refused : mapping of str to collection of float
+        At which t_rep [s] a backend found nothing, by its name.
+    """
+
+    def __init__(self, backend: RepairBackend, name: str, refused: Mapping[str, Collection[float]]) -> None:
+        super().__init__(backend, name)
+        helpers = dict(backend.capabilities.helpers)
+        for each in helpers.keys() & refused.keys():
+            helpers[each] = partial(_refusing, helpers[each], refused[each])
+        self.capabilities = replace(backend.capabilities, helpers=helpers)
+
+
+class _Refusing:
+    """A backend that is not asked again at some t_rep [s]."""
+
+    def __init__(self, backend: RepairBackend, refused: Collection[float]) -> None:
+        self.name, self.capabilities = backend.name, backend.capabilities
+        self._backend, self._refused = backend, refused
+
+    def solve(
+        self, problem: RepairProblem, *, warm_start: Curve | None = None, time_limit: float | None = None
+    ) -> SolveResult:
+        """Nothing where it has been asked, else what the backend answers."""
+        if any(abs(problem.t_rep - t_rep) <= INSTANT for t_rep in self._refused):
+            return SolveResult(SolveStatus.INFEASIBLE, detail=f"{self.name} was asked before")
+        return self._backend.solve(problem, warm_start=warm_start, time_limit=time_limit)
+
+
+def _refusing(make: Callable[[], RepairBackend], refused: Collection[float]) -> RepairBackend:
+    return _Refusing(make(), refused)
+
+
 def _told(on_probe: Callable[[Probe], None], by: str, probe: Probe) -> None:
     on_probe(replace(probe, by=by, fallback=True))
 
@@ -103,7 +145,7 @@ def _search_with(
     def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
         own = situation.unguided if one.capabilities.own_way else situation.source
         return search_f_ttr(
-            around or own, situation.conflict, Guarded(one, name, done), situation.judge, settings,
+            around or own, situation.conflict, _Unaided(one, name, refused), situation.judge, settings,
             visits=visits, on_probe=on_probe if several is None else by(name), after=best,
         )  # fmt: skip
 
@@ -115,7 +157,7 @@ def _search_with(
 
         return visited
 
-    several, probes, done = backend.capabilities.members, list[Probe](), set[str]()
+    several, probes, refused = backend.capabilities.members, list[Probe](), dict[str, set[float]]()
     if several is None:
         return ask(name, backend, settings, None)
     begin, complete, best = time.perf_counter(), True, None
@@ -132,7 +174,7 @@ def _search_with(
         upper = end if settings.upper is None else min(end, settings.upper)
         now = replace(settings, time_limit=limit, upper=upper if math.isfinite(upper) else None)
         found = ask(each, member, now, best)
-        done.add(each)  # whoever comes next need not ask it for help: it has said no
+        refused[each] = {probe.t_rep for probe in found.probes if not probe.feasible}
         if found.status in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING):
             return found
         best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
