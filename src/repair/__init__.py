@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from repair.solvers.registry import backend_names
     from repair.solvers.registry import register as register_backend
     from repair.vehicle.model import register as register_vehicle
+    from repair.why.explain import Explanation, explain
 
     __version__: str
 
@@ -68,6 +69,7 @@ __all__ = [
     "ConfigError",
     "Conflict",
     "Cycle",
+    "Explanation",
     "FrenetTrajectory",
     "Maneuver",
     "ModeResult",
@@ -96,6 +98,7 @@ __all__ = [
     "available_backends",
     "backend_names",
     "bound",
+    "explain",
     "load_config",
     "load_result",
     "load_scene",
@@ -139,6 +142,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.search.result": ("Probe", "SearchResult", "SearchStatus"),
     "repair.situation": ("Situation",),
     "repair.solvers.registry": ("backend_names",),
+    "repair.why.explain": ("Explanation", "explain"),
 }  # fmt: skip
 # public name -> (module, name in it)
 _HOME = {name: (module, name) for module, names in _NAMES.items() for name in names}

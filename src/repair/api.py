@@ -39,6 +39,7 @@ from repair.solvers.registry import make_backend
 from repair.terminal.verdict import Terminal
 from repair.vehicle.commonroad_ks import load_official
 from repair.vehicle.states import DrivenStates
+from repair.why.explain import Explanation, explain
 
 if TYPE_CHECKING:
     from repair.search.settings import SearchConfig
@@ -75,6 +76,8 @@ class RepairResult:
         ``checker.terminal: off``.
     onward : Onward or None
         What is driven after the evasive part (``repair.goal``, ``repair.rejoin``); None where nobody asked.
+    explanation : Explanation or None
+        Why there is no repair, or no later one (``explain.wanted``).
     """
 
     prepared: Prepared
@@ -88,6 +91,7 @@ class RepairResult:
     bounds: dict[str, Bound] = field(default_factory=dict)
     terminal: Terminal | None = None
     onward: Onward | None = None
+    explanation: Explanation | None = None
 
     def __repr__(self) -> str:
         return "\n".join(f"{name:9} {text}" for name, text in headline(self.to_dict()))
@@ -131,7 +135,7 @@ class RepairResult:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
             self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
-            self.modes, self.bounds, self.terminal, self.onward,
+            self.modes, self.bounds, self.terminal, self.onward, self.explanation,
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
@@ -170,6 +174,7 @@ def repair(
     *,
     on_probe: Callable[[Probe], None] | None = None,
     on_found: Callable[[SearchResult], None] | None = None,
+    on_explaining: Callable[[str], None] | None = None,
     reference: Any = None,
     traffic: Iterable[Any] | None = None,
     **keys: Any,
@@ -184,9 +189,9 @@ def repair(
         See :func:`repair.load_config`; defaults otherwise.
     on_probe : callable, optional
         Called after every probe (anytime use).
-    on_found : callable, optional
+    on_found, on_explaining : callable, optional
         Called when the search has ended, before anything is made of it: from then on an interrupt is the
-        caller's.
+        caller's; and with what an explanation looks at next, in words.
     reference : optional
         What is followed, from memory, instead of what ``reference.source`` names: an array (N, 3..5) with the
         columns ``t [s], x [m], y [m][, yaw [rad][, v [m/s]]]``, a mapping with these names, a CommonRoad
@@ -229,6 +234,7 @@ def repair(
         backend,
         on_probe=on_probe,
         on_found=on_found,
+        on_explaining=on_explaining,
         phases=phases.seconds,
     )
 
@@ -245,6 +251,7 @@ def search(
     *,
     on_probe: Callable[[Probe], None] | None = None,
     on_found: Callable[[SearchResult], None] | None = None,
+    on_explaining: Callable[[str], None] | None = None,
     phases: dict[str, float] | None = None,
 ) -> RepairResult:
     """Algorithm 1 on something prepared (or, with ``driver: at_ttr``, the same search at the TTR alone)."""
@@ -282,9 +289,13 @@ def search(
     if config.bound.wanted:
         with timed("bound"):
             bounds = bound(prepared, config.bound)
+    explanation = None
+    if config.explain.wanted:
+        with timed("explain"):
+            explanation = explain(prepared, found, on_progress=on_explaining)
     return RepairResult(
         prepared, found, driven.states, driven.peaks, timed.seconds, metrics,
-        capabilities_of(backend, found), modes, bounds, driven.terminal, driven.onward,
+        capabilities_of(backend, found), modes, bounds, driven.terminal, driven.onward, explanation,
     )  # fmt: skip
 
 

@@ -17,13 +17,13 @@ from repair.bounds.obstacles import Occupied, occupied, with_standing
 from repair.bounds.settings import BoundConfig
 from repair.bounds.start import driven_within, motions_from
 from repair.bounds.tree import Attempt, attempt
-from repair.timegrid import steps_until
+from repair.timegrid import STEP, steps_until
 from repair.vehicle.model import KinematicSingleTrack
 
 if TYPE_CHECKING:
     from repair.situation import Situation
 
-__all__ = ["Bound", "Proof", "bound", "too_late"]
+__all__ = ["Bound", "Proof", "bound", "proof_at", "too_late"]
 
 _AROUND = 40.0  # where the edge of the road is looked at [m]
 _DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
@@ -119,6 +119,30 @@ def bound(situation: Situation, settings: BoundConfig | None = None) -> dict[str
 def too_late(situation: Situation, settings: BoundConfig) -> float:
     """From when on the checker calls nothing feasible any more [s]; infinite where that is not proven."""
     return bound(situation, replace(settings, kinds=["search"]))["search"].time
+
+
+def proof_at(situation: Situation, t_rep: float, settings: BoundConfig, kind: str = "search") -> Proof | None:
+    """A proof that it is too late at one time to react; None where there is none.
+
+    Parameters
+    ----------
+    situation : Situation
+    t_rep : float
+        [s]; the proof is about the last sample of the reference at or before it, and holds later too.
+    settings : BoundConfig
+        ``nodes`` and ``time_limit`` count, and how finely the bound is looked for does not.
+    kind : str
+        For whom (:data:`repair.bounds.settings.KINDS`).
+    """
+    if kind == "search" and not situation.checker.config.limits:
+        return None
+    if not isinstance(situation.scene.model, KinematicSingleTrack):
+        return None
+    if not t_rep < situation.conflict.time < math.inf:
+        return None
+    world = _World(situation, settings)
+    k, begin = max(math.floor(t_rep / world.h + STEP), 0), time.thread_time()
+    return _proof(kind, world, k, settings.nodes, lambda: time.thread_time() - begin > settings.time_limit)[1]
 
 
 class _World:

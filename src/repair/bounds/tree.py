@@ -181,7 +181,10 @@ class _Search:
         return Drive(np.stack((np.cos(middle), np.sin(middle)), axis=1), *bounds)
 
     def _closed(self, node: _Node, rows: Rows, drive: Drive, multipliers: Array) -> bool:
-        share = np.round(multipliers / multipliers.max(), _DIGITS)
+        most = multipliers.max(initial=0.0)
+        if not most > 0.0:  # the solver gave up: that closes nothing
+            return False
+        share = np.round(multipliers / most, _DIGITS)
         if not excess(self.motions, self.times, rows, drive, share) > 0.0:
             return False
         turned = (len(share) - len(node.places)) // 2

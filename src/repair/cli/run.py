@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,10 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
         "--bound", action="store_true", help="prove from when on nothing avoids the conflict any more"
     )
     parser.add_argument(
+        "--explain", action="store_true",
+        help="say what is in the way of a repair, or of a later one, and the least that would help",
+    )  # fmt: skip
+    parser.add_argument(
         "--to-goal", action="store_true", help="go on until the planning problem's goal is reached"
     )
     parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
@@ -46,6 +51,8 @@ def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
     """The scenario's file and the configuration; the paper's scenarios come with their presets."""
     if arguments.bound:
         arguments.overrides = [*arguments.overrides, "bound.wanted=true"]
+    if arguments.explain:
+        arguments.overrides = [*arguments.overrides, "explain.wanted=true"]
     if arguments.to_goal:
         arguments.overrides = [*arguments.overrides, "repair.goal=true"]
     config = resolve(arguments)
@@ -92,6 +99,19 @@ class _Interrupts:
             signal.signal(signal.SIGINT, self.before)
 
 
+def _progress(after: float = 2.0) -> Callable[[str], None]:
+    """Tells a terminal what an explanation looks at, once it takes longer than ``after`` [s]."""
+    begin: list[float] = []
+
+    def tell(words: str) -> None:
+        begin.append(time.perf_counter())
+        spent = begin[-1] - begin[0]
+        if spent > after and sys.stderr.isatty():
+            print(f"repair: explaining, {spent:.0f} s: {words}", file=sys.stderr)
+
+    return tell
+
+
 def run(arguments: argparse.Namespace) -> int:
     """One scenario; the result on stdout, and in files where a folder is given."""
     if arguments.out is not None:
@@ -103,7 +123,7 @@ def run(arguments: argparse.Namespace) -> int:
         from repair.io.result_json import to_json
         from repair.report.text import summary
 
-        result = repair(path, config, on_found=interrupts.found)
+        result = repair(path, config, on_found=interrupts.found, on_explaining=_progress())
         content, problem = result.to_dict(), None
         written: list[Path] = []
         if arguments.out is not None:

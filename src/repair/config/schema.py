@@ -19,7 +19,7 @@ from repair.reference.settings import ReferenceConfig
 from repair.registry import Registry
 from repair.scene.settings import SceneConfig
 from repair.search.rules import RULES
-from repair.search.settings import SearchConfig
+from repair.search.settings import ExplainConfig, SearchConfig
 from repair.settings import Key, keys_of, require_type, setting
 from repair.solvers.registry import BACKENDS, backend_names, sections
 
@@ -59,6 +59,7 @@ class Config:
     evasive: EvasiveConfig = field(default_factory=EvasiveConfig)
     checker: CheckerConfig = field(default_factory=CheckerConfig)
     bound: BoundConfig = field(default_factory=BoundConfig)
+    explain: ExplainConfig = field(default_factory=ExplainConfig)
     for_backend: dict[str, Any] = setting(
         factory=dict, says="keys that count where a backend is used, by its name"
     )

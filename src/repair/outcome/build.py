@@ -17,6 +17,7 @@ from repair.search.modes import ModeResult
 from repair.search.result import SearchResult
 from repair.terminal.verdict import Terminal
 from repair.vehicle.states import DrivenStates
+from repair.why.explain import Explanation
 
 __all__ = ["outcome_of"]
 
@@ -33,9 +34,11 @@ def outcome_of(
     bounds: Mapping[str, Bound] | None = None,
     terminal: Terminal | None = None,
     onward: Onward | None = None,
+    explanation: Explanation | None = None,
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
     record = record_of(
-        prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal, onward
-    )
+        prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal, onward,
+        explanation,
+    )  # fmt: skip
     return Outcome(record, drawing_of(prepared, found, states, terminal, onward))

@@ -22,6 +22,7 @@ from repair.outcome.driven import driven_curve
 from repair.outcome.ending import columns_of, detail_of, place_of, terminal_to_dict
 from repair.outcome.onward_record import onward_to_dict
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
+from repair.outcome.why_record import explanation_to_dict
 from repair.preparation import Prepared
 from repair.problem.limits import Limits
 from repair.scene.provenance import provenance
@@ -29,6 +30,7 @@ from repair.search.modes import ModeResult
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.terminal.verdict import Terminal
 from repair.vehicle.states import DrivenStates
+from repair.why.explain import Explanation
 
 __all__ = ["peaks_to_dict", "probe_peaks", "record_of"]
 
@@ -50,6 +52,7 @@ def record_of(
     bounds: Mapping[str, Bound] | None = None,
     terminal: Terminal | None = None,
     onward: Onward | None = None,
+    explanation: Explanation | None = None,
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -75,6 +78,8 @@ def record_of(
         How the repair ends.
     onward : Onward or None
         What is driven after the evasive part.
+    explanation : Explanation or None
+        Why there is no repair, or no later one.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -110,6 +115,7 @@ def record_of(
         "repaired_by": _by(prepared, best) if best is not None else None,
         "by_fallback": best.fallback if best is not None else None,
         "bound": bound_to_dict(prepared, found, bounds or {}),
+        "explanation": explanation_to_dict(explanation),
         "metrics": {name: _metric(value) for name, value in metrics.items()},
         "modes": [_mode(mode) for mode in modes],
         "maneuver": best.maneuver.value if best is not None and best.maneuver is not None else None,

@@ -8,6 +8,7 @@ from typing import Any
 
 from repair.report.bound import bound_rows
 from repair.report.notes import grouped
+from repair.report.rows.why import why_rows
 
 __all__ = ["fixed", "headline", "probe_table", "summary"]
 
@@ -65,6 +66,7 @@ def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[s
         ("TTC", _ttc(content)),
         ("F-TTR", _f_ttr(content)),
         *bound_rows(content),
+        *why_rows(content),
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))

@@ -1,4 +1,4 @@
-"""Algorithm 1."""
+"""Algorithm 1, and why it finds nothing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 from repair.settings import setting
 
-__all__ = ["SearchConfig"]
+__all__ = ["EXPLAINED", "ExplainConfig", "SearchConfig"]
+
+#: What could be different, in the order in which it is tried.
+EXPLAINED = (
+    "removed", "friction", "road", "later", "earlier", "away", "start", "engine", "steering",
+)  # fmt: skip
+_WITH = ("explain.wanted", (True,))
 
 
 @dataclass
@@ -35,4 +41,27 @@ class SearchConfig:
         "best",
         "best: every open side of passing is tried; first: the first feasible one",
         choices=("best", "first"),
+    )
+
+
+@dataclass
+class ExplainConfig:
+    """Why there is no repair, or no later one."""
+
+    wanted: bool = setting(
+        False, "say what is in the way of a repair, or of a later one, and what would help"
+    )
+    kinds: list[str] = setting(
+        factory=lambda: list(EXPLAINED),
+        says="what could be different: an obstacle removed, later, earlier or further away; more friction, "
+        "road, engine, steering; a slower start",
+        choices=EXPLAINED,
+        only_with=_WITH,
+    )
+    time_limit: float = setting(
+        10.0,
+        "processor time [s]; what is found by then is told, and which kinds were not tried",
+        low=0.0,
+        high=1e6,
+        only_with=_WITH,
     )

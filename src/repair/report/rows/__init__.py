@@ -1,0 +1,1 @@
+"""Rows of the account of a result, by what they are about."""

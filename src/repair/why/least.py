@@ -1,0 +1,163 @@
+"""The smallest amount that suffices, by bisection, and what shows it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from repair.preparation import Prepared
+from repair.why.asked import Asked, Cut, Found
+from repair.why.kinds import KINDS, Kind, under
+
+__all__ = ["Relaxation", "smallest"]
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """What came of assuming something else.
+
+    Attributes
+    ----------
+    kind : str
+        One of :data:`repair.why.kinds.KINDS`.
+    obstacle_id, index : int or None
+        Of the obstacle that is changed, and which one of the scene's it is.
+    status : str
+        ``sufficient``; ``not_sufficient``, up to ``most``; ``impossible``, where it cannot be assumed
+        (``detail`` says why); ``cut``, where the time was up.
+    amount : float or None
+        The smallest that was found to suffice; None without one, and where there is no amount.
+    half : float or None
+        Half of it (in whole steps), with which nobody finds a repair.
+    proven : float or None
+        With this much of it there is none: proven. None where nothing was proven, or where more of the kind
+        may allow less.
+    most : float or None
+        How much was tried.
+    by : str
+        Whose the repair is; ``reference`` where nothing has to be repaired any more.
+    detail : str
+    """
+
+    kind: str
+    status: str
+    obstacle_id: int | None = None
+    index: int | None = None
+    amount: float | None = None
+    half: float | None = None
+    proven: float | None = None
+    most: float | None = None
+    by: str = ""
+    detail: str = ""
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether there is an amount that suffices."""
+        return self.status == "sufficient"
+
+
+class _Trial:
+    """One kind, by whole steps of its amount; each is looked at once."""
+
+    def __init__(self, prepared: Prepared, asked: Asked, kind: Kind, index: int | None) -> None:
+        self.prepared, self.asked, self.kind, self.index = prepared, asked, kind, index
+        dt = prepared.scene.dt
+        # who moves obstacles in time moves them by whole steps of the scenario
+        self.step = max(round(kind.step / dt), 1) * dt if kind.unit == "s" else kind.step
+        most = kind.most
+        if math.isinf(most):
+            most = max(float(prepared.scene.start[1, 0]) - self.step, 0.0)
+        self.count = int(most / self.step + 1e-6) if self.step else 0
+        self.known: dict[int, Found | None] = {0: None}
+        self.proven = 0
+
+    def amount(self, n: int) -> float:
+        return round(n * self.step, 9)
+
+    def enough(self, n: int) -> bool:
+        if n not in self.known:
+            situation = under(self.prepared, self.kind.name, self.amount(n), self.index)
+            if self.kind.monotone and self.asked.proof(situation) is not None:
+                self.known[n], self.proven = None, max(self.proven, n)
+            else:
+                self.known[n] = self.asked.repair(situation, proofs=not self.kind.monotone)
+        return self.known[n] is not None
+
+    def smallest(self) -> int | None:
+        """The smallest number of steps that suffices, of which half do not; None where none does."""
+        low, high = self._enclosed()
+        if high is None:
+            return None
+        while True:
+            high = _bisected(low, high, self.enough)
+            if not self.enough(high // 2):
+                return high
+            low, high = 0, high // 2
+
+    def prove(self, high: int) -> None:
+        """Find the largest number of steps below ``high`` that is proven to be too few."""
+        if not self.kind.monotone or self.asked.proof(self.prepared) is None:
+            return
+
+        def open_(n: int) -> bool:
+            situation = under(self.prepared, self.kind.name, self.amount(n), self.index)
+            return self.asked.proof(situation) is None
+
+        self.proven = _bisected(self.proven, high, open_) - 1
+
+    def _enclosed(self) -> tuple[int, int | None]:
+        """Numbers of steps of which the first does not suffice and the second does."""
+        if self.kind.monotone:
+            return 0, self.count if self.count and self.enough(self.count) else None
+        low, high = 0, 1
+        while high <= self.count:
+            if self.enough(high):
+                return low, high
+            low, high = high, 2 * high
+        return 0, None
+
+
+def _bisected(low: int, high: int, enough: Callable[[int], bool]) -> int:
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high
+
+
+def smallest(prepared: Prepared, asked: Asked, name: str, index: int | None = None) -> Relaxation:
+    """The smallest amount of a kind with which there is a repair.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        Of which there is no repair.
+    asked : Asked
+    name : str
+        Of the kind.
+    index : int, optional
+        Of the obstacle in the scene, where the kind changes one.
+    """
+    kind = KINDS[name]
+    who = None if index is None else prepared.scene.obstacles[index].id
+    trial = _Trial(prepared, asked, kind, index)
+    try:
+        if not kind.step:
+            found = asked.repair(under(prepared, name, 0.0, index))
+            status = "sufficient" if found is not None else "not_sufficient"
+            return Relaxation(name, status, who, index, by="" if found is None else found.by)
+        n = trial.smallest()
+        trial.prove(trial.count + 1 if n is None else n)
+    except Cut:
+        return Relaxation(name, "cut", who, index)
+    except ValueError as why:
+        return Relaxation(name, "impossible", who, index, detail=str(why))
+    proven = trial.amount(trial.proven) if kind.monotone and trial.proven else None
+    most = trial.amount(trial.count)
+    if n is None:
+        return Relaxation(name, "not_sufficient", who, index, proven=proven, most=most)
+    found = trial.known[n]
+    assert found is not None
+    return Relaxation(
+        name, "sufficient", who, index, trial.amount(n), trial.amount(n // 2), proven, most, found.by
+    )
