@@ -14,7 +14,7 @@ class LimitsConfig:
     """What a repaired trajectory may do; null means the vehicle's own limit."""
 
     v_max: float | None = setting(None, "speed [m/s]; null: the vehicle's", low=0.1, high=200.0)
-    v_lat: float = setting(3.0, "speed sideways, across the driven path [m/s]", low=1e-3, high=100.0)
+    v_lat: float = setting(8.0, "speed sideways, across the driven path [m/s]", low=1e-3, high=100.0)
     a_min: float | None = setting(None, "braking [m/s²]; null: minus a_total", low=-100.0, high=-1e-3)
     a_max: float | None = setting(
         None,
