@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from repair.io.result_json import load_result
     from repair.metrics.registry import register as register_metric
+    from repair.mitigation.mitigate import Mitigation, mitigate
     from repair.outcome.data import Outcome
     from repair.preparation import Prepared, prepare
     from repair.problem.problem import Maneuver, RepairProblem
@@ -72,6 +73,7 @@ __all__ = [
     "Explanation",
     "FrenetTrajectory",
     "Maneuver",
+    "Mitigation",
     "ModeResult",
     "Outcome",
     "OutputError",
@@ -102,6 +104,7 @@ __all__ = [
     "load_config",
     "load_result",
     "load_scene",
+    "mitigate",
     "predictions_of",
     "prepare",
     "preset_names",
@@ -122,6 +125,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         "BackendSpec", "Capabilities", "Closest", "RepairBackend", "SolveResult", "SolveStatus",
     ),
     "repair.bounds.latest": ("Bound", "bound"),
+    "repair.mitigation.mitigate": ("Mitigation", "mitigate"),
     "repair.check.verdict": ("Conflict", "Reason", "Verdict"),
     "repair.config": ("Config", "load_config", "preset_names"),
     "repair.curves.base": ("FrenetTrajectory",),

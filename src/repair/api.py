@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from repair.backend.base import Capabilities, RepairBackend
 from repair.baselines.evasive.at_ttr import AtTtr
-from repair.bounds.latest import Bound, bound
+from repair.bounds.latest import Bound
 from repair.check.peaks import Peaks
 from repair.config.load import load_config
 from repair.config.schema import Config, require_types
@@ -22,10 +22,12 @@ from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
 from repair.io.destination import require_folder
 from repair.metrics.base import Asked, MetricValue
 from repair.metrics.registry import measure
+from repair.mitigation.mitigate import Mitigation
 from repair.onward.plan import Onward
 from repair.outcome.build import outcome_of
 from repair.outcome.data import Outcome
 from repair.outcome.driven import driven_curve, what_is_driven
+from repair.outcome.known import what_is_known
 from repair.preparation import Phases, Prepared, among, prepare
 from repair.report.notebook import page_of
 from repair.report.text import headline
@@ -39,7 +41,7 @@ from repair.solvers.registry import make_backend
 from repair.terminal.verdict import Terminal
 from repair.vehicle.commonroad_ks import load_official
 from repair.vehicle.states import DrivenStates
-from repair.why.explain import Explanation, explain
+from repair.why.explain import Explanation
 
 if TYPE_CHECKING:
     from repair.search.settings import SearchConfig
@@ -78,6 +80,8 @@ class RepairResult:
         What is driven after the evasive part (``repair.goal``, ``repair.rejoin``); None where nobody asked.
     explanation : Explanation or None
         Why there is no repair, or no later one (``explain.wanted``).
+    mitigation : Mitigation or None
+        What hits least hard, where nothing was found and ``mitigation.wanted``.
     """
 
     prepared: Prepared
@@ -92,6 +96,7 @@ class RepairResult:
     terminal: Terminal | None = None
     onward: Onward | None = None
     explanation: Explanation | None = None
+    mitigation: Mitigation | None = None
 
     def __repr__(self) -> str:
         return "\n".join(f"{name:9} {text}" for name, text in headline(self.to_dict()))
@@ -135,7 +140,7 @@ class RepairResult:
         """The pure data of it, which figures and tables are made from."""
         return outcome_of(
             self.prepared, self.search, self.states, self.peaks, self.phases, self.metrics, self.capabilities,
-            self.modes, self.bounds, self.terminal, self.onward, self.explanation,
+            self.modes, self.bounds, self.terminal, self.onward, self.explanation, self.mitigation,
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
@@ -154,7 +159,9 @@ class RepairResult:
         """Write the result into a folder; its outcome with the names of the files, and their paths."""
         target = path_of(folder, "the folder of a result", OutputError)
         require_folder(target)
-        made = Saved(self.outcome, self.prepared.scene, self.states, self.status, figure, self.bounds)
+        made = Saved(
+            self.outcome, self.prepared.scene, self.states, self.status, figure, self.bounds, self.mitigation
+        )
         return saved(made, target)
 
     def save(self, folder: str | Path, *, figure: bool = True) -> list[Path]:
@@ -285,17 +292,11 @@ def search(
                 prepared.scene.modes, prepared.scene.obstacles, found,
                 lambda traffic: find(among(prepared, traffic), backend),
             )  # fmt: skip
-    bounds: dict[str, Bound] = {}
-    if config.bound.wanted:
-        with timed("bound"):
-            bounds = bound(prepared, config.bound)
-    explanation = None
-    if config.explain.wanted:
-        with timed("explain"):
-            explanation = explain(prepared, found, on_progress=on_explaining)
+    known = what_is_known(prepared, found, timed, on_explaining)
     return RepairResult(
-        prepared, found, driven.states, driven.peaks, timed.seconds, metrics,
-        capabilities_of(backend, found), modes, bounds, driven.terminal, driven.onward, explanation,
+        prepared, known.found, driven.states, driven.peaks, timed.seconds, metrics,
+        capabilities_of(backend, found), modes, known.bounds, driven.terminal, driven.onward,
+        known.explanation, known.mitigation,
     )  # fmt: skip
 
 

@@ -12,13 +12,20 @@ from typing import Any
 from repair.bounds.latest import Bound
 from repair.bounds.written import PROOF_FILE, proof_bytes
 from repair.errors import OutputError, foreign
-from repair.io.commonroad import no_solution_because, scenario_bytes, to_solution
+from repair.io.commonroad import (
+    in_the_form_of_a_solution,
+    no_solution_because,
+    scenario_bytes,
+    to_solution,
+)
 from repair.io.files import write_files
 from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_json
+from repair.mitigation.mitigate import Mitigation
 from repair.outcome.data import Outcome
 from repair.registry import Registry, loaded
 from repair.scene.scene import Scene
 from repair.search.result import SearchStatus
+from repair.vehicle.parameters import VEHICLE_NAMES
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["FORMATS", "Files", "Format", "Saved", "register", "saved"]
@@ -41,6 +48,8 @@ class Saved:
         Whether figures are wanted.
     bounds : mapping
         From when on it is proven too late, by kind.
+    mitigation : Mitigation or None
+        The motion that hits least hard, where nothing was found.
     """
 
     outcome: Outcome
@@ -49,6 +58,7 @@ class Saved:
     status: SearchStatus
     figures: bool
     bounds: Mapping[str, Bound] = field(default_factory=dict)
+    mitigation: Mitigation | None = None
 
     @property
     def name(self) -> str:
@@ -87,6 +97,19 @@ def solution_file(result: Saved) -> Files:
 
     solution = to_solution(result.scene, result.states, result.status)
     return Files({name: CommonRoadSolutionWriter(solution).dump().encode()}, {"solution_file": name})
+
+
+def mitigation_file(result: Saved) -> Files:
+    """The motion that hits least hard, in the form of a solution, which it is not: it ends in a collision."""
+    name, told = f"mitigation_{result.name}.xml", result.outcome.record.get("mitigation")
+    best = None if result.mitigation is None else result.mitigation.best
+    if told is None or best is None or result.scene.vehicle.type_id not in VEHICLE_NAMES:
+        return Files({}, {}, (name,))
+    from commonroad.common.solution import CommonRoadSolutionWriter
+
+    written = in_the_form_of_a_solution(result.scene, best.states)
+    content = CommonRoadSolutionWriter(written).dump().encode()
+    return Files({name: content}, {"mitigation": {**told, "solution_file": name}})
 
 
 def drawing_file(result: Saved) -> Files:
@@ -139,6 +162,7 @@ FORMATS: Registry[Format] = Registry(
     "output format",
     {
         "solution": solution_file,
+        "mitigation": mitigation_file,
         "figures": figure_files,
         "scenario": scenario_file,
         "drawing": drawing_file,

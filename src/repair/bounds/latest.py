@@ -110,7 +110,7 @@ def bound(situation: Situation, settings: BoundConfig | None = None) -> dict[str
         config: Any = getattr(situation, "config", None)
         settings = config.bound if config is not None else BoundConfig()
     conflict = situation.conflict.time
-    if not math.isfinite(conflict) or conflict <= 0.0:
+    if not math.isfinite(conflict) or situation.conflict.contact_time <= 0.0:
         return {kind: Bound(kind, math.inf, "no_conflict") for kind in settings.kinds}
     world = _World(situation, settings)
     return {kind: _bound(kind, world, settings) for kind in settings.kinds}
@@ -227,7 +227,7 @@ def _bound(kind: str, world: _World, settings: BoundConfig) -> Bound:
         found = proof
         return True
 
-    earliest(max((world.end - 1) // world.stride, -1), proves)
+    earliest(max((world.end - 1) // world.stride, 0), proves)
     spent = time.thread_time() - begin
     if found is None:
         return Bound(kind, math.inf, why, not cut, nodes, spent)

@@ -41,6 +41,10 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
         help="say what is in the way of a repair, or of a later one, and the least that would help",
     )  # fmt: skip
     parser.add_argument(
+        "--mitigate", action="store_true",
+        help="where nothing is found: prove that nothing can be, and look for the least impact speed",
+    )  # fmt: skip
+    parser.add_argument(
         "--to-goal", action="store_true", help="go on until the planning problem's goal is reached"
     )
     parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
@@ -53,6 +57,8 @@ def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
         arguments.overrides = [*arguments.overrides, "bound.wanted=true"]
     if arguments.explain:
         arguments.overrides = [*arguments.overrides, "explain.wanted=true"]
+    if arguments.mitigate:
+        arguments.overrides = [*arguments.overrides, "mitigation.wanted=true"]
     if arguments.to_goal:
         arguments.overrides = [*arguments.overrides, "repair.goal=true"]
     config = resolve(arguments)

@@ -13,6 +13,7 @@ from repair.check.registry import CHECKS
 from repair.check.settings import CheckerConfig
 from repair.errors import BackendError, ConfigError, in_words
 from repair.metrics.registry import METRICS
+from repair.mitigation.settings import MitigationConfig
 from repair.problem.settings import LimitsConfig, RepairConfig
 from repair.reference.registry import SOURCES
 from repair.reference.settings import ReferenceConfig
@@ -60,6 +61,7 @@ class Config:
     checker: CheckerConfig = field(default_factory=CheckerConfig)
     bound: BoundConfig = field(default_factory=BoundConfig)
     explain: ExplainConfig = field(default_factory=ExplainConfig)
+    mitigation: MitigationConfig = field(default_factory=MitigationConfig)
     for_backend: dict[str, Any] = setting(
         factory=dict, says="keys that count where a backend is used, by its name"
     )

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
     from repair.vehicle.states import DrivenStates
 
-__all__ = ["no_solution_because", "scenario_bytes", "to_dynamic_obstacle", "to_solution", "to_trajectory"]
+__all__ = [
+    "in_the_form_of_a_solution", "no_solution_because", "scenario_bytes", "to_dynamic_obstacle",
+    "to_solution", "to_trajectory",
+]  # fmt: skip
 
 _DIGITS = 12  # of what is written of a scenario from memory
 
@@ -110,6 +113,16 @@ def to_solution(scene: Scene, states: DrivenStates, status: SearchStatus) -> Any
         If there is no verified trajectory (a colliding one is never handed out as a solution), or the
         vehicle is none of CommonRoad's.
     """
+    if why := no_solution_because(scene, status):
+        raise OutputError(f"there is no solution to write: {why}")
+    return in_the_form_of_a_solution(scene, states)
+
+
+def in_the_form_of_a_solution(scene: Scene, states: DrivenStates) -> Any:
+    """States in CommonRoad's form of a solution, whether they are one or not.
+
+    The vehicle has to be one of CommonRoad's.
+    """
     from commonroad.common.solution import (
         CostFunction,
         PlanningProblemSolution,
@@ -118,8 +131,6 @@ def to_solution(scene: Scene, states: DrivenStates, status: SearchStatus) -> Any
         VehicleType,
     )
 
-    if why := no_solution_because(scene, status):
-        raise OutputError(f"there is no solution to write: {why}")
     problem = PlanningProblemSolution(
         planning_problem_id=scene.planning_problem_id,
         vehicle_model=VehicleModel.KS,

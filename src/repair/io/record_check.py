@@ -138,6 +138,14 @@ _TERMINAL: Mapping[str, Test] = {
     "tried": _whole,
     "trajectory": _maybe(_table_of(_list_of(_number))),
 }
+_HIT: Mapping[str, Test] = {
+    **{key: _maybe(_text) for key in ("maneuver", "found_by", "ends")},
+    **{key: _maybe(_number) for key in ("contact_t_s", "impact_speed_mps", "own_speed_mps", "overlap_m")},
+    "obstacle_id": _maybe(_whole),
+    "from_behind": _maybe(_flag),
+    "place_m": _maybe(_list_of(_number)),
+    "trajectory": _maybe(_all_of(_TRAJECTORY)),
+}
 #: What every result has had since there are results.
 _NEEDED: dict[str, Test] = {
     "scenario": _text,
@@ -186,6 +194,7 @@ _OTHERS: dict[str, Test] = {
     "onward": _maybe(_all_of({"kind": _text, "reached": _flag, "sentence": _text, "tried": _whole})),
     "terminal": _maybe(_all_of(_TERMINAL)),
     "explanation": _maybe(_all_of(_EXPLANATION)),
+    "mitigation": _maybe(_all_of({**_HIT, "full_braking": _maybe(_all_of(_HIT))}, {"proven": _maybe(_text)})),
     "limits": _table_of(_maybe(_number)),
     "versions": lambda value: isinstance(value, dict),
 }

@@ -8,6 +8,7 @@ from repair.backend.base import Capabilities
 from repair.bounds.latest import Bound
 from repair.check.peaks import Peaks
 from repair.metrics.base import MetricValue
+from repair.mitigation.mitigate import Mitigation
 from repair.onward.plan import Onward
 from repair.outcome.data import Outcome
 from repair.outcome.draw import drawing_of
@@ -35,10 +36,11 @@ def outcome_of(
     terminal: Terminal | None = None,
     onward: Onward | None = None,
     explanation: Explanation | None = None,
+    mitigation: Mitigation | None = None,
 ) -> Outcome:
     """Everything that outlives a search; see :func:`repair.outcome.record.record_of` for the parameters."""
     record = record_of(
         prepared, found, states, peaks, phases, metrics, capabilities, modes, bounds, terminal, onward,
-        explanation,
+        explanation, mitigation,
     )  # fmt: skip
-    return Outcome(record, drawing_of(prepared, found, states, terminal, onward))
+    return Outcome(record, drawing_of(prepared, found, states, terminal, onward, mitigation))

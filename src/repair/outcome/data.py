@@ -19,7 +19,8 @@ class Line:
     ----------
     kind : str
         ``reference``; ``repair``, of a visited time-to-repair; ``stage``, on the way to it; ``continuation``,
-        the stop after the repair; ``onward``, what is driven after it.
+        the stop after the repair; ``onward``, what is driven after it; ``mitigation``, what hits least hard
+        where there is no repair, until then.
     name : str
         Of the stage; of a continuation how safe that end is; else empty.
     t_rep : float or None

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.curves.base import Curve, SplicedCurve
+from repair.mitigation.mitigate import Mitigation
 from repair.onward.plan import Onward
 from repair.outcome.data import Body, Box, Drawing, Line
 from repair.preparation import Prepared
 from repair.scene.traffic.obstacle import Obstacle
 from repair.search.result import SearchResult, SearchStatus
 from repair.terminal.verdict import Terminal
-from repair.timegrid import INSTANT
+from repair.timegrid import INSTANT, STEP
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["drawing_of"]
@@ -28,6 +31,7 @@ def drawing_of(
     states: DrivenStates,
     terminal: Terminal | None = None,
     onward: Onward | None = None,
+    mitigation: Mitigation | None = None,
 ) -> Drawing:
     """Lines, boxes, road and traffic of a result.
 
@@ -41,6 +45,8 @@ def drawing_of(
         How the repair ends.
     onward : Onward or None
         What is driven after the evasive part.
+    mitigation : Mitigation or None
+        The motion that hits least hard, drawn until then.
     """
     scene, dt = prepared.scene, prepared.scene.dt
     until = prepared.t_end if found.probes else prepared.t_reference
@@ -48,7 +54,7 @@ def drawing_of(
     moment, end = round(at / dt), round(until / dt)
     # The conflict first: where labels would cover each other, the earlier one stays.
     steps = tuple(dict.fromkeys([moment, 0, end, moment // 2]))
-    lines = (*_lines(prepared, found, until), *_after(prepared, terminal, onward))
+    lines = (*_lines(prepared, found, until), *_after(prepared, terminal, onward, mitigation))
     driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
     seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])
     # A figure is at least as high as a fifth of its width, and shows that much road.
@@ -105,17 +111,24 @@ def _line(prepared: Prepared, curve: Curve, t_rep: float | None, kind: str, name
     return Line(kind, name, t_rep, *(_rounded(column[k]) for column in columns))
 
 
-def _after(prepared: Prepared, terminal: Terminal | None, onward: Onward | None) -> tuple[Line, ...]:
-    """The stop after the repair, and what is driven after it, as densely as the others."""
-    curves: list[tuple[str, str, Curve]] = []
+def _after(
+    prepared: Prepared, terminal: Terminal | None, onward: Onward | None, mitigation: Mitigation | None
+) -> tuple[Line, ...]:
+    """The stop after the repair, what is driven after it, what hits least hard; as densely as the others."""
+    curves: list[tuple[str, str, Curve, float]] = []
     if terminal is not None and terminal.continuation is not None:
-        curves.append(("continuation", terminal.ending.value, terminal.continuation.stop))
+        stop = terminal.continuation.stop
+        curves.append(("continuation", terminal.ending.value, stop, stop.t_end))
     if onward is not None and onward.leg is not None:
-        curves.append(("onward", onward.kind, onward.leg))
+        curves.append(("onward", onward.kind, onward.leg, onward.leg.t_end))
+    if mitigation is not None and (best := mitigation.best) is not None:
+        end = min(best.impact.time, mitigation.t_end)
+        curves.append(("mitigation", best.impact.kind, best.curve, end))
     lines = []
-    for kind, name, curve in curves:
-        count = round((curve.t_end - curve.t_start) / prepared.scene.dt) * prepared.config.checker.substeps
-        samples = curve.sample(np.linspace(curve.t_start, curve.t_end, count + 1))
+    for kind, name, curve, end in curves:
+        steps = max(math.ceil((end - curve.t_start) / prepared.scene.dt - STEP), 1)
+        count = steps * prepared.config.checker.substeps
+        samples = curve.sample(np.linspace(curve.t_start, end, count + 1))
         path = prepared.scene.frame.cartesian(samples)
         columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
         lines.append(Line(kind, name, None, *(_rounded(column) for column in columns)))

@@ -16,11 +16,13 @@ from repair.check.peaks import Peaks
 from repair.curves.base import SplicedCurve
 from repair.curves.codec import curve_to_dict
 from repair.metrics.base import MetricValue
+from repair.mitigation.mitigate import Mitigation
 from repair.onward.plan import Onward
 from repair.outcome.bound_record import bound_to_dict
 from repair.outcome.driven import driven_curve
 from repair.outcome.ending import columns_of, detail_of, place_of, terminal_to_dict
 from repair.outcome.onward_record import onward_to_dict
+from repair.outcome.records.mitigation import mitigation_to_dict
 from repair.outcome.sentence import checked_until, checks_off, margin_only, one_point, status_sentence
 from repair.outcome.why_record import explanation_to_dict
 from repair.preparation import Prepared
@@ -53,6 +55,7 @@ def record_of(
     terminal: Terminal | None = None,
     onward: Onward | None = None,
     explanation: Explanation | None = None,
+    mitigation: Mitigation | None = None,
 ) -> dict[str, Any]:
     """Plain Python values, in a fixed order, no NaN and no infinity.
 
@@ -80,6 +83,8 @@ def record_of(
         What is driven after the evasive part.
     explanation : Explanation or None
         Why there is no repair, or no later one.
+    mitigation : Mitigation or None
+        The motion that hits least hard, where nothing was found.
     """
     conflict, scene = found.conflict, prepared.scene
     best = found.best
@@ -123,6 +128,7 @@ def record_of(
         "probes": [_probe(prepared, p) for p in found.probes],
         "terminal": terminal_to_dict(terminal),
         "onward": onward_to_dict(onward),
+        "mitigation": mitigation_to_dict(mitigation, bounds, scene.initial_time_step, scene.dt),
         "curve": curve_to_dict(found.curve),
         "reference": curve_to_dict(prepared.reference, prepared.t_reference),
         "given_reference": None if prepared.given is None else prepared.given.plain,

@@ -8,6 +8,7 @@ from typing import Any
 
 from repair.report.bound import bound_rows
 from repair.report.notes import grouped
+from repair.report.rows.mitigation import mitigation_rows
 from repair.report.rows.why import why_rows
 
 __all__ = ["fixed", "headline", "probe_table", "summary"]
@@ -67,6 +68,7 @@ def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[s
         ("F-TTR", _f_ttr(content)),
         *bound_rows(content),
         *why_rows(content),
+        *mitigation_rows(content),
     ]
     if content["peak_deceleration_mps2"] is not None:
         rows.append(("Repair", _extremes(content)))

@@ -48,6 +48,7 @@ class SearchStatus(str, Enum):
     ALREADY_COLLIDING = "already_colliding"
     NONE_FEASIBLE = "none_feasible"
     BUDGET_EXHAUSTED = "budget_exhausted"
+    UNAVOIDABLE = "unavoidable"  # no search says so: a proof does (repair.mitigation.status)
 
     @property
     def sentence(self) -> str:
@@ -59,6 +60,8 @@ class SearchStatus(str, Enum):
             "none_feasible": "no tested time-to-repair has a feasible repair",
             "budget_exhausted": "the search was cut short, by its time limit or an interrupt, before any "
             "feasible repair was found",
+            "unavoidable": "it is proven that from the very start on every motion of the vehicle touches an "
+            "obstacle or leaves the road",
         }[self.value]
 
 

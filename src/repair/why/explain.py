@@ -76,7 +76,7 @@ class Explanation:
 def explained_time(found: SearchResult) -> float | None:
     """The time-to-repair that there is something to explain about [s]; None where there is none."""
     probes = [p.t_rep for p in found.probes if not p.feasible]
-    if found.status is SearchStatus.NONE_FEASIBLE:
+    if found.status in (SearchStatus.NONE_FEASIBLE, SearchStatus.UNAVOIDABLE):
         return min(probes, default=0.0)
     if found.status is not SearchStatus.FOUND or found.f_ttr is None:
         return None

@@ -35,11 +35,15 @@ __all__ = ["CollisionWorld", "Contact"]
 
 
 class Contact(NamedTuple):
-    """First contact: time [s], the obstacle, and whether that obstacle strikes from behind."""
+    """First contact: time [s], the obstacle, whether it strikes from behind, and its velocity (x, y) [m/s].
+
+    The velocity is that of its centre within the scenario's step; zero for who has none, as some sets.
+    """
 
     time: float
     obstacle_id: int
     from_behind: bool
+    velocity: tuple[float, float] = (0.0, 0.0)
 
 
 class _Hit(NamedTuple):
@@ -168,7 +172,8 @@ class CollisionWorld:
             ego = np.array([moved.real, moved.imag]) * self.substeps / self.dt
         offset = centre - (here[k].real, here[k].imag)
         behind = offset @ axis < -0.5 * self._sides[0] and (velocity - ego) @ axis > 0.0
-        return Contact(found.time, self._obstacles[found.obstacle].id, bool(behind))
+        vx, vy = np.nan_to_num(velocity).tolist()
+        return Contact(found.time, self._obstacles[found.obstacle].id, bool(behind), (vx, vy))
 
     def _motion(self, index: int, time: float) -> tuple[Array, Array]:
         """Centre and velocity of an obstacle at a time."""

@@ -14,7 +14,7 @@ from repair.solvers.shooting.motion import Driven
 from repair.solvers.shooting.plans import Steps
 from repair.world.tracks import as_complex
 
-__all__ = ["Space"]
+__all__ = ["Space", "depths", "looks"]
 
 _ABEAM = 1.3  # [rad]
 _INCH = 1e-3  # a margin that is kept to this is kept [m]
@@ -67,7 +67,7 @@ class Space:
             s, l = problem.start[0]  # noqa: E741
             centre = shapes.frame.to_cartesian(s, l).view(np.complex128)
             heading = np.atleast_1d(shapes.frame.heading(s))
-            depth = _depth(
+            depth = depths(
                 np.broadcast_to(centre, (1, len(rows))), np.broadcast_to(heading, (1, len(rows))),
                 now[rows, columns], shapes, room[rows],
             )[0]  # fmt: skip
@@ -76,7 +76,7 @@ class Space:
 
     def excess(self, driven: Driven) -> tuple[Array, Array]:
         """How far into obstacles and beyond the road, in metres times looks, and at most in metres (N,)."""
-        s, l, chi, beta = _looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
+        s, l, chi, beta = looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
         shown = len(self._times)
         s, l, chi, beta = s[:, :shown], l[:, :shown], chi[:, :shown], beta[:, :shown]  # noqa: E741
         if self.problem.shapes is None:
@@ -106,11 +106,11 @@ class Space:
         shapes = self.problem.shapes
         if shapes is None or shapes.road is None:
             return np.zeros(len(driven.s))
-        s, l, chi, beta = _looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
+        s, l, chi, beta = looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
         x, y = shapes.frame.to_cartesian(s, l).reshape(-1, 2).T
         inside = shapes.road.inside(shapes.road.outline(x, y, (shapes.frame.heading(s) + chi - beta).ravel()))
-        looks: Array = np.count_nonzero(~inside.reshape(s.shape), axis=1).astype(np.float64)
-        return looks
+        off: Array = np.count_nonzero(~inside.reshape(s.shape), axis=1).astype(np.float64)
+        return off
 
     def _in_shapes(self, s: Array, l: Array, turned: Array, shapes: Shapes) -> tuple[Array, Array]:  # noqa: E741
         plane = shapes.frame.to_cartesian(s, l)
@@ -127,7 +127,7 @@ class Space:
         if not len(track):
             none = np.zeros(len(s))
             return none, none
-        depth = _depth(centre[:, look], heading[:, look], boxes[track, look], shapes, self._room[track])
+        depth = depths(centre[:, look], heading[:, look], boxes[track, look], shapes, self._room[track])
         return depth.sum(axis=1) / self.fine, depth.max(axis=1)
 
     def _in_boxes(self, s: Array, l: Array) -> tuple[Array, Array]:  # noqa: E741
@@ -163,7 +163,7 @@ def _lost(driven: Driven) -> Array:
     return np.asarray(np.maximum(np.abs(driven.chi) - _ABEAM, 0.0).max(axis=1))
 
 
-def _looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tuple[Array, Array, Array, Array]:
+def looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tuple[Array, Array, Array, Array]:
     """s, l, chi and beta (N, T fine) within and at the end of the steps: cubics and lines."""
     x = np.arange(1, fine + 1) / fine
     s, l, v, chi, beta = driven[:5]  # noqa: E741
@@ -181,7 +181,7 @@ def _looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tupl
     return found[0], found[1], found[2], found[3]
 
 
-def _depth(centre: Points, heading: Array, boxes: Array, shapes: Shapes, room: Array) -> Array:
+def depths(centre: Points, heading: Array, boxes: Array, shapes: Shapes, room: Array) -> Array:
     """By how much the ego (N, P), enlarged by ``room`` (P,), reaches into rectangles (P, 5): at least 0.
 
     Along the axis that leaves most (separating axes).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,6 +56,8 @@ class Task:
     ----------
     problem : RepairProblem
     config : ShootingConfig
+    space : callable
+        Makes what says how far trajectories miss, of the problem, the steps and the looks at each.
 
     Attributes
     ----------
@@ -62,7 +65,9 @@ class Task:
         How many sets of trajectories were driven.
     """
 
-    def __init__(self, problem: RepairProblem, config: ShootingConfig) -> None:
+    def __init__(
+        self, problem: RepairProblem, config: ShootingConfig, space: Callable[..., Space] = Space
+    ) -> None:
         self.problem, self.config = problem, config
         self.iterations = 0
         self.steps = Steps.between(problem.t_rep, problem.t_end, problem.dt)
@@ -76,7 +81,7 @@ class Task:
         curvature = problem.curvature_at if shapes is None else shapes.frame.curvature
         self.exact = replace(self.car, curvature=curvature, parts=2)
         looks = _COARSE, _FINE, _ON_MAP
-        self.coarse, self.fine, self.on_map = (Space(problem, self.steps, each) for each in looks)
+        self.coarse, self.fine, self.on_map = (space(problem, self.steps, each) for each in looks)
         (s, l), (along, aside) = problem.start[:2].tolist()  # noqa: E741
         kappa = float(problem.curvature_at(s))
         forward = (1.0 - kappa * l) * max(along, 0.0)

@@ -1,0 +1,1 @@
+"""Where nothing avoids the conflict: the motion that hits least hard."""
