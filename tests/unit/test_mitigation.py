@@ -242,3 +242,12 @@ def test_the_same_each_time(tmp_path):
     text = situation("crossing", 15.0, 5.4, 10.0)
     both = [repair.mitigate(prepared(tmp_path, text), PATIENT).best.impact for _ in range(2)]
     assert both[0] == both[1]
+
+
+def test_several_backends_at_one_time_are_drawn(tmp_path):
+    """Of two that were asked at the same time only one leaves a curve."""
+    found = result_of(tmp_path, situation("crossing", 15.0, 5.4, 10.0))
+    assert len(found.search.probes) > 1
+    assert len({p.t_rep for p in found.search.probes}) == 1
+    assert any(p.solve.curve is None for p in found.search.probes)
+    assert any(path.name == "birdseye.png" for path in found.save(tmp_path / "out"))

@@ -70,6 +70,7 @@ def repair_lines(outcome: Outcome) -> list[Styled]:
     from matplotlib import colormaps
 
     curves = [line for line in drawing_in(outcome).lines if line.kind == "repair"]
+    # Several backends may have been asked at one time, and one of them may have left no curve.
     probes = [p for p in outcome.probes if _has_curve(p, curves)]
     if len(probes) != len(curves):
         raise OutputError(
@@ -85,7 +86,8 @@ def repair_lines(outcome: Outcome) -> list[Styled]:
 
 
 def _has_curve(probe: dict[str, Any], curves: list[Line]) -> bool:
-    return any(abs((line.t_rep or 0.0) - probe["t_rep_s"]) < STEP for line in curves)
+    left = probe["min_speed_mps"] is not None
+    return left and any(abs((line.t_rep or 0.0) - probe["t_rep_s"]) < STEP for line in curves)
 
 
 def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) -> Styled:
