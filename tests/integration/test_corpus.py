@@ -162,7 +162,7 @@ def test_backends_that_do_not_agree(file: Path) -> None:
     assert violated([few]) == ["agreement"]
     assert "worthless 1" in report([few])
     assert "not solved on purpose" in report([few])
-    helped = examine(file, replace(alone, overrides=()))
+    helped = examine(file, replace(alone, overrides=("fallback=[ego]",)))
     assert violated([helped]) == []
     assert "1 of these by a fallback of worthless: 1" in report([helped])
 

@@ -143,7 +143,7 @@ def test_a_narrowed_road_keeps_the_path():
 def test_the_soft_backend_swerves_later_than_at_the_first_try(speed, without, said, tmp_path: Path):
     """Corners leave the road where the ego stands at an angle to it; soft limits are exceeded a little."""
     path = swerve(speed, tmp_path)
-    keys = ["reference.source=constant", "search.delta_t=0.1", "search.rule=scan"]
+    keys = ["reference.source=constant", "search.delta_t=0.1", "search.rule=scan", "limits.v_lat=3"]
     once = repair.repair(path, backend="ego", overrides=[*keys, without])
     again = repair.repair(path, backend="ego", overrides=keys)
     assert again.f_ttr > once.f_ttr + 0.05

@@ -68,8 +68,8 @@ def test_a_lanelet_whose_left_bound_is_on_its_right_is_no_road():
 def test_who_crosses_a_gap_that_counts_as_road_is_told(wide):
     road = boundary([lanelet(1, 3.5, 0.0), lanelet(2, -wide, -3.5)], 0.35)
     x, along, across = np.array([20.0, 30.0]), np.array([1.75, 1.75]), np.array([1.75, 0.0])
-    assert road.over_a_gap(x, along, np.zeros(2)) == ""
-    words = road.over_a_gap(x, across, np.zeros(2))
+    assert road.over_a_gap(x, along, np.zeros(2)) is None
+    _, words, _ = road.over_a_gap(x, across, np.zeros(2))
     assert "crosses a gap of the map at (30.0, " in words
     assert road.first_off_road(x, across, np.zeros(2)) is None
-    assert boundary([lanelet(1, 3.5, 0.0)], 0.0).over_a_gap(x, across, np.zeros(2)) == ""
+    assert boundary([lanelet(1, 3.5, 0.0)], 0.0).over_a_gap(x, across, np.zeros(2)) is None

@@ -88,14 +88,16 @@ def test_the_size_of_a_gap_that_is_road_is_a_setting(tmp_path: Path) -> None:
 @pytest.mark.parametrize("gap", [0.001, 0.1, 0.35])
 @pytest.mark.parametrize("declared", [True, False])
 def test_a_gap_to_the_neighbour_is_road(tmp_path: Path, gap: float, declared: bool) -> None:
-    """The ego goes around a standing car by way of the lane beside it."""
+    """The ego goes around a standing car by way of the lane beside it; CommonRoad's own boundary check has no
+    road between lanes that do not know of each other, so that has to be asked for."""
+    more = [] if declared else ["checker.gaps=always"]
     left = '<adjacentLeft ref="2" drivingDir="same"/>' if declared else ""
     right = '<adjacentRight ref="1" drivingDir="same"/>' if declared else ""
     road = roads.strip(1, straight(-50.0, FAR), more=left)
     road += roads.strip(2, straight(-50.0, FAR, 4.0 + gap), more=right)
     standing = roads.car(30, roads.state(90.0, 0.0, v=0.0))
     fast = roads.state(0.0, 0.0, v=25.0)
-    found = answer(loaded(tmp_path, road, standing, fast))
+    found = answer(loaded(tmp_path, road, standing, fast), "casadi", *more)
     apart = answer(loaded(tmp_path, roads.strip(1, straight(-50.0, FAR)), standing, fast))
     assert found.status.value == "found"
     assert found.f_ttr > apart.f_ttr
@@ -213,3 +215,21 @@ def test_scenarios_lists_what_was_bridged(tmp_path: Path, capsys) -> None:
     assert main(["scenarios", str(tmp_path)]) == 0
     assert "Error" in capsys.readouterr().out
     assert main(["scenarios", str(tmp_path / "no.xml")]) == 2
+
+
+def test_a_repair_crosses_gaps_of_the_map_only_where_its_reference_does(tmp_path: Path) -> None:
+    """Two lanes, 0.2 m apart and not drawn as neighbours: no way to the side for CommonRoad's check."""
+    road = roads.strip(1, straight(-50.0, FAR)) + roads.strip(2, straight(-50.0, FAR, 4.2))
+    standing = roads.car(30, roads.state(90.0, 0.0, v=0.0))
+    scene = loaded(tmp_path, road, standing, roads.state(0.0, 0.0, v=25.0))
+    kept, crossed = (
+        answer(scene, "shooting", f"checker.gaps={gaps}", "search.delta_t=0.1", "search.rule=scan")
+        for gaps in ("as_reference", "always")
+    )
+    assert kept.search.best.maneuver.value == "yield"
+    assert crossed.search.best.maneuver.value == "left"
+    assert crossed.f_ttr > kept.f_ttr
+    assert any("crosses a gap of the map" in note for note in crossed.to_dict()["notes"])
+    assert not any("crosses a gap of the map" in note for note in kept.to_dict()["notes"])
+    refused = [p for p in kept.search.probes if p.t_rep > kept.f_ttr]
+    assert any("crosses a gap of the map" in v.detail for p in refused for v in p.verdict.violations)

@@ -188,8 +188,8 @@ class Configuration(Protocol):
         ...
 
     @property
-    def fallback(self) -> Sequence[str]:
-        """Names of the backends that are asked where a search ends without a repair."""
+    def fallback(self) -> Sequence[str] | None:
+        """Names of the backends that are asked where a search ends without a repair; None: as registered."""
         ...
 
     def section(self, name: str) -> Any:
@@ -214,6 +214,8 @@ class BackendSpec:
         One line for people.
     helpers : tuple of str
         Names of the backends that :attr:`Capabilities.helpers` make.
+    fallbacks : tuple of str
+        Names of the backends that :attr:`Capabilities.fallbacks` makes where nobody says otherwise.
     members : str
         Field of its settings that names the backends that :attr:`Capabilities.members` makes; empty for none.
     """
@@ -223,4 +225,5 @@ class BackendSpec:
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
     helpers: tuple[str, ...] = ()
+    fallbacks: tuple[str, ...] = ()
     members: str = ""

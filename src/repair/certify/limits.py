@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from repair.arrays import Array
 from repair.certify.certificate import CertificateRow, at_least, at_most
 from repair.certify.motion import Motion, States
+from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
     from repair.problem.limits import Limits
@@ -19,29 +21,51 @@ _PARTS = 20  # of a step, in which the model is integrated
 __all__ = ["driven_rows", "physical_rows", "weakened"]
 
 
-def driven_rows(motion: Motion, limits: Limits, *, reference: bool) -> list[CertificateRow]:
+def driven_rows(motion: Motion, limits: Limits, reference: Limits, t_rep: float) -> list[CertificateRow]:
     """The middle of the vehicle along the curve, from millisecond to millisecond.
+
+    The reference until the repair begins and the repair are held against limits of their own; a row has the
+    one that is nearer to its limit.
 
     Parameters
     ----------
     motion : Motion
     limits : Limits
-    reference : bool
-        A reference may begin by rolling back, as the planning problem has it.
+        Of the repair.
+    reference : Limits
+        Of the reference, which is followed until then; it may begin by rolling back, as the planning problem
+        has it.
+    t_rep : float
+        When the repair begins [s]; inf without one.
     """
     step = np.diff(motion.t)
     along = np.diff(motion.speed) / step
     across = 0.5 * (motion.speed[1:] + motion.speed[:-1]) * np.diff(motion.heading) / step
-    slowest = min(0.0, float(motion.speed[0])) if reference else 0.0
-    rows = [
-        at_most("speed, driven", float(motion.speed.max()), limits.v_max, "sampled", "m/s"),
-        at_least("speed, driven, least", float(motion.speed.min()), slowest, "sampled", "m/s"),
+    begins = int(motion.t.searchsorted(t_rep - INSTANT))
+    rolling = min(0.0, float(motion.speed[0]))
+    parts = [
+        _held(motion.speed[part], along[part], across[part], own, slowest)
+        for part, own, slowest in (
+            (slice(begins, None), limits, 0.0),
+            (slice(0, begins), reference, rolling),
+        )
+        if len(along[part])
+    ]
+    rows = [min(same, key=lambda row: row.margin) for same in zip(*parts, strict=True)]
+    return [row for row in rows if np.isfinite(row.limit)]  # CommonRoad's own checker judges the rest
+
+
+def _held(speed: Array, along: Array, across: Array, limits: Limits, slowest: float) -> list[CertificateRow]:
+    """A part of the way against the limits that hold there."""
+    grip = float(np.hypot(along, across).max())
+    return [
+        at_most("speed, driven", float(speed.max()), limits.v_max, "sampled", "m/s"),
+        at_least("speed, driven, least", float(speed.min()), slowest, "sampled", "m/s"),
         at_least("acceleration, driven, least", float(along.min()), limits.a_min, "sampled", "m/s²"),
         at_most("acceleration, driven, largest", float(along.max()), limits.a_max, "sampled", "m/s²"),
         at_most("lateral acceleration", float(np.abs(across).max()), limits.a_lat, "sampled", "m/s²"),
-        at_most("friction circle", float(np.hypot(along, across).max()), limits.a_total, "sampled", "m/s²"),
+        at_most("friction circle", grip, limits.a_total, "sampled", "m/s²"),
     ]
-    return [row for row in rows if np.isfinite(row.limit)]  # CommonRoad's own checker judges the rest
 
 
 def physical_rows(states: States, dt: float, vehicle: Vehicle) -> list[CertificateRow]:

@@ -12,6 +12,7 @@ answers of the CommonRoad drivability checker on the solution file.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -114,8 +115,8 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
         rows += derivative_rows(curve, prepared.limits, keeps_hull=bool(said.get("keeps_hull", True)))
         allowed, margin = boxes_kept(content), prepared.config.checker.margin
         rows += clearance_rows(curve, prepared.occupancy, dt, t_repaired, allowed, margin)
-    judged = prepared.checker.reference_limits if curve is None else prepared.limits
-    rows += driven_rows(planned, judged, reference=curve is None)
+    followed = math.inf if curve is None else t_rep
+    rows += driven_rows(planned, prepared.limits, prepared.checker.reference_limits, followed)
     rows += physical_rows(states, dt, scene.vehicle)
     rows += contact_rows(prepared, ways, traffic, t_rep)
     road = road_rows(prepared, anew.scenario, ways)

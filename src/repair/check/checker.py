@@ -6,8 +6,6 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
+from repair.check.followed import Followed, is_finite, motion_of
 from repair.check.limits import Excess, curve_excess, plane_excess, speed_excess, surely_kept, vehicle_excess
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
@@ -35,17 +34,6 @@ if TYPE_CHECKING:
 __all__ = ["Checker"]
 
 _TURNED = 0.01  # a repair may begin turned off the reference by this [rad]
-
-
-@dataclass(frozen=True)
-class _Followed:
-    """The reference at all dense samples until ``t_end``; every check follows it for a step or two."""
-
-    reference: Curve
-    t_end: float
-    motion: Array
-    slip: Array
-    heading: float
 
 
 class Checker:
@@ -79,7 +67,7 @@ class Checker:
         self.road = None if self.edge is None else self.edge.boundary
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
-        self._followed: _Followed | None = None
+        self._followed: Followed | None = None
         self._checks = {name: CHECKS[name] for name in config.extra}
         self._beside = self._met_at_start(config.clearance) if config.clearance else frozenset()
 
@@ -125,7 +113,7 @@ class Checker:
         times = self.times(problem.t_end)
         after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
         path, s, slip0 = self._spliced(problem, after, times, first)
-        if not _finite(path):
+        if not is_finite(path):
             return _NOT_FINITE
         slip, orientation = self.scene.model.angles(path, slip0)
         found = self._limits(curve, after, problem, path)
@@ -136,10 +124,25 @@ class Checker:
         if self.config.limits and not found:
             at = slice(None, None, self.config.substeps)
             found += _as_violation(vehicle_excess(path.t[at], path.speed[at], slip[at], self.scene.vehicle))
+        if not found and self.config.gaps == "as_reference":
+            found += self._over_a_gap(problem, path, orientation)
         if not first and not found and problem.t_rep < INSTANT:
             found += self._turned_at_start(problem, float(orientation[0]))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
+
+    def _over_a_gap(self, problem: RepairProblem, path: CartesianPath, orientation: Array) -> list[Violation]:
+        """A gap of the map that is no road for CommonRoad's own check, where the reference crosses none."""
+        crossed = self._gap_under(path, orientation)
+        if crossed is None or self._kept(problem.reference, problem.t_end).crosses:
+            return []
+        index, words, place = crossed
+        return [Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place)]
+
+    def _gap_under(
+        self, path: CartesianPath, orientation: Array
+    ) -> tuple[int, str, tuple[float, float]] | None:
+        return None if self.road is None else self.road.over_a_gap(path.xy[:, 0], path.xy[:, 1], orientation)
 
     def _turned_at_start(self, problem: RepairProblem, orientation: float) -> list[Violation]:
         """A repair that begins at once has to begin with the body as it stands, like the reference."""
@@ -165,7 +168,7 @@ class Checker:
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: by the same measure as a repair's, jerks apart."""
         path, s, slip, orientation = self._follow(reference, t_end)
-        if not _finite(path):
+        if not is_finite(path):
             return _NOT_FINITE
         found = self._clear(path, s, orientation, 0, 0.0)
         if self.config.limits:
@@ -180,13 +183,14 @@ class Checker:
     def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
         """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
         times = self.times(t_end)
-        motion = _motion(reference.sample(times), len(times))
+        motion = motion_of(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
         slip, orientation = self.scene.model.angles(path, self._standing(path))
-        self._followed = _Followed(reference, t_end, motion, slip, float(path.heading[0]))
+        crosses = self._gap_under(path, orientation) is not None
+        self._followed = Followed(reference, t_end, motion, slip, float(path.heading[0]), crosses)
         return path, motion[0], slip, orientation
 
-    def _kept(self, reference: Curve, t_end: float) -> _Followed:
+    def _kept(self, reference: Curve, t_end: float) -> Followed:
         """What was kept of the reference, at least until ``t_end``."""
         kept = self._followed
         while kept is None or kept.reference is not reference or kept.t_end < t_end:
@@ -203,7 +207,7 @@ class Checker:
         slip angle (None).
         """
         late, slip0 = len(times) - len(after), None
-        motion = _motion(after, len(times) - first)
+        motion = motion_of(after, len(times) - first)
         if late:
             kept = self._kept(problem.reference, problem.t_end)
             motion[:, : late - first] = kept.motion[:, first:late]
@@ -333,18 +337,3 @@ def _as_violation(broken: list[Excess]) -> list[Violation]:
         return []
     words = "; ".join(dict.fromkeys(excess.words for excess in broken))
     return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
-
-
-def _motion(trajectory: FrenetTrajectory, count: int) -> Array:
-    """The last of ``count`` samples of s, l and their rates (4, count); those before are left open."""
-    motion = np.empty((4, count))
-    start = count - len(trajectory)
-    motion[:2, start:], motion[2:, start:] = trajectory.position.T, trajectory.velocity.T
-    return motion
-
-
-def _finite(path: CartesianPath) -> bool:
-    # A point or a heading that is not finite would make the longest step or the sharpest turn so.
-    if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
-        return True
-    return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))

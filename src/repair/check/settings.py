@@ -28,6 +28,13 @@ class CheckerConfig:
     road_gap: float = setting(
         0.35, "gaps and holes of the map up to this width are road [m]", low=0.0, high=2.0
     )
+    gaps: str = setting(
+        "as_reference",
+        "whether a repair may cross such a gap where CommonRoad's own boundary check has no road: only if "
+        "the reference does, or always",
+        choices=("as_reference", "always"),
+        only_with=("checker.road", (True,)),
+    )
     limits: bool = setting(True, "the repaired part keeps the limits")
     margin: bool = setting(False, "the repaired part keeps out of the inflated boxes, as the TTC has it")
     conflict: str = setting(

@@ -22,7 +22,7 @@ from repair.scene.settings import SceneConfig
 from repair.search.rules import RULES
 from repair.search.settings import ExplainConfig, SearchConfig
 from repair.settings import Key, keys_of, require_type, setting
-from repair.solvers.registry import BACKENDS, backend_names, sections
+from repair.solvers.registry import BACKENDS, backend_names, fallbacks_of, sections
 
 __all__ = [
     "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "words_of",
@@ -42,10 +42,10 @@ class Config:
         choices=("f_ttr", "at_ttr"),
     )
     backend: str = setting("ego", "ego, casadi, qptr, shooting, portfolio, or one that is registered")
-    fallback: list[str] = setting(
-        factory=lambda: ["ego", "shooting"],
-        says="backends that are asked, in this order, where the search ends without a repair; the result "
-        "says whose it is",
+    fallback: list[str] | None = setting(
+        None,
+        "backends that are asked, in this order, where the search ends without a repair; the result says "
+        "whose it is; null: for ego shooting, for casadi and qptr ego and then shooting, for others none",
         registry="backend",
         only_with=("driver", ("f_ttr",)),
     )
@@ -105,7 +105,7 @@ class Config:
     def _asked(self) -> set[str]:
         """Names of all backends that may have a say."""
         asked: set[str] = set()
-        further = [self.backend, *(self.fallback if self.driver == "f_ttr" else ())]
+        further = [self.backend, *(fallbacks_of(self.backend, self) if self.driver == "f_ttr" else ())]
         while further:
             name = further.pop()
             if name in asked or name not in backend_names():

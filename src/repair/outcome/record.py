@@ -240,7 +240,8 @@ def _over_a_gap(prepared: Prepared, found: SearchResult, states: DrivenStates) -
     road = prepared.checker.road
     if road is None or found.status not in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         return ""
-    return road.over_a_gap(states.x, states.y, states.orientation)
+    crossed = road.over_a_gap(states.x, states.y, states.orientation)
+    return "" if crossed is None else crossed[1]
 
 
 def _metric(metric: MetricValue) -> dict[str, Any]:

@@ -29,7 +29,9 @@ def _possible(key: Key) -> str:
     words, known = words_of(key), key.setting
     if words is not None:
         listed = ", ".join(f"`{word}`" for word in words)
-        return f"list of {listed or 'registered names'}" if isinstance(key.default, list) else listed
+        or_null = " or null" if key.type.endswith("null") else ""
+        several = "list of " if key.type.startswith("list") else ""
+        return f"{several}{listed or 'registered names'}{or_null}"
     if known.low is None or known.high is None:
         return key.type
     return f"{known.low:g} to {known.high:g}" + (" or null" if key.type.endswith("null") else "")

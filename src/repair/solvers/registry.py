@@ -23,7 +23,10 @@ from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.portfolio.settings import PortfolioConfig
 from repair.solvers.shooting.settings import ShootingConfig
 
-__all__ = ["BACKENDS", "available", "backend_names", "describe", "make_backend", "register", "sections"]
+__all__ = [
+    "BACKENDS", "available", "backend_names", "describe", "fallbacks_of", "make_backend", "register",
+    "sections",
+]  # fmt: skip
 
 _IMPORT = 0.05  # [s] what importing a backend may take, the packages that it needs being there
 
@@ -35,6 +38,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             EgoConfig,
             ("scipy",),
             "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
+            fallbacks=("shooting",),
         ),
         "casadi": BackendSpec(
             "repair.solvers.casadi.backend:make",
@@ -42,12 +46,14 @@ BACKENDS: Registry[BackendSpec] = Registry(
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
             helpers=("ego", "shooting"),
+            fallbacks=("ego", "shooting"),
         ),
         "qptr": BackendSpec(
             "repair.baselines.qptr.backend:make",
             QptrConfig,
             ("qpsolvers",),
             "Bernstein QP in a convex driving corridor (baseline)",
+            fallbacks=("ego", "shooting"),
         ),
         "shooting": BackendSpec(
             "repair.solvers.shooting.backend:make",
@@ -157,10 +163,15 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
     if spec.members:
         names = getattr(config.section(name), spec.members)
         made.capabilities = replace(made.capabilities, members=_members(names, config))
-    others = [each for each in config.fallback if each != name]
-    if others:
+    if others := fallbacks_of(name, config):
         made.capabilities = replace(made.capabilities, fallbacks=_members(others, config))
     return made
+
+
+def fallbacks_of(name: str, config: Configuration) -> list[str]:
+    """Names of the backends that are asked where a search with this one ends without a repair."""
+    names = BACKENDS[name].fallbacks if config.fallback is None else config.fallback
+    return [each for each in names if each != name]
 
 
 def _members(names: Sequence[str], config: Configuration) -> Callable[[], Mapping[str, RepairBackend]]:

@@ -128,7 +128,7 @@ class EndJudge:
         if self._made is None or self._made.n_steps < needed:
             ahead = math.ceil(1.25 * (needed - steps_until(self.source.t_end, scene.dt)))
             n_steps = max(scene.n_steps, needed, steps_until(self.source.t_end, scene.dt) + ahead)
-            config = replace(checker.config, margin=False)
+            config = replace(checker.config, margin=False, gaps="always")
 
             known = traffic_until(scene, n_steps)
 

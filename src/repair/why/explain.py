@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from repair.preparation import Prepared
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import ExplainConfig
-from repair.solvers.registry import make_backend
+from repair.solvers.registry import fallbacks_of, make_backend
 from repair.timegrid import INSTANT
 from repair.why.asked import Asked, Cut
 from repair.why.kinds import KINDS
@@ -130,7 +130,9 @@ class _Explained:
     ) -> None:
         self.prepared, self.settings, self.tell = prepared, settings, tell
         config = prepared.config
-        names = dict.fromkeys((*config.fallback, _ORACLE, config.backend))  # the cheap ones first
+        names = dict.fromkeys(
+            (*fallbacks_of(config.backend, config), _ORACLE, config.backend)
+        )  # the cheap ones first
         self.asked = Asked(t_rep, {name: make_backend(name, config) for name in names}, settings.time_limit)
 
     def explanation(self) -> Explanation:

@@ -6,7 +6,6 @@ Without closed gaps the verdicts are at least as strict as those of the drivabil
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array
 from repair.scene.road.joints import Bridge
+from repair.scene.road.sections import outlines
 
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
@@ -66,7 +66,7 @@ class RoadBoundary:
 
         self._scenario = scenario
         self._corners = vehicle.corners
-        self.region = shapely.union_all(_outlines(scenario.lanelet_network))
+        self.region = shapely.union_all(outlines(scenario.lanelet_network))
         self._drawn = self.region
         if gap > 0.0:
             self.region = _closed(self.region, gap)
@@ -74,30 +74,48 @@ class RoadBoundary:
         self.spare = max(_TOUCH, 1e-14 * float(np.abs(np.nan_to_num(self.region.bounds)).max(initial=0.0)))
         self._triangles: Any = None
 
-    def over_a_gap(self, x: Array, y: Array, orientation: Array) -> str:
-        """Where poses (K,) first cross what is road here and in no section of the map, or nothing."""
+    def over_a_gap(
+        self, x: Array, y: Array, orientation: Array
+    ) -> tuple[int, str, tuple[float, float]] | None:
+        """The first of poses (K,) that crosses what is road here and in no section of the map.
+
+        Returns
+        -------
+        tuple or None
+            Its index, where and how much of it in words, and the place [m].
+        """
+        if self._gaps is None or not len(x):
+            return None
         import shapely
 
-        if not len(x):
-            return ""
-        bodies, sections = shapely.polygons(self.outline(x, y, orientation)), self._sections
-        for body in bodies[~shapely.covers(sections, bodies)]:
-            part = shapely.difference(shapely.intersection(body, self.region), sections)
+        bodies = shapely.polygons(self.outline(x, y, orientation))
+        with _PREPARED:
+            near = np.flatnonzero(shapely.intersects(self._gaps, bodies))
+        for index in near.tolist():
+            part = shapely.intersection(bodies[index], self._gaps)
             if (area := float(shapely.area(part))) > _SLIVER:
                 at = shapely.centroid(part)
-                return (
+                words = (
                     f"the way crosses a gap of the map at ({at.x:.1f}, {at.y:.1f}), {area:.3f} m² under the "
                     "ego, or lanelets drawn askew: road here (checker.road_gap), and none for CommonRoad's "
                     "own boundary check"
                 )
-        return ""
+                return index, words, (float(at.x), float(at.y))
+        return None
 
     @cached_property
-    def _sections(self) -> Any:
-        """What the drivability checker has as road: the sections alone."""
+    def _gaps(self) -> Any:
+        """What is road here and none for the drivability checker, which has the sections alone; or None."""
         import shapely
 
-        return shapely.union_all(_outlines(self._scenario.lanelet_network, sections_alone=True))
+        sections = shapely.union_all(outlines(self._scenario.lanelet_network, sections_alone=True))
+        parts = shapely.get_parts(shapely.difference(self.region, sections))
+        parts = parts[shapely.area(parts) > _SLIVER]
+        if not len(parts):
+            return None
+        gaps = shapely.union_all(parts)
+        shapely.prepare(gaps)
+        return gaps
 
     def bridged(self, near: Any = None) -> list[Bridge]:
         """The gaps and holes of the map that count as road.
@@ -270,71 +288,3 @@ def grouping(count: int, size: int) -> npt.NDArray[np.intp]:
     by_place = np.ascontiguousarray(groups.T)
     by_place.setflags(write=False)
     return by_place
-
-
-def _outlines(network: Any, *, sections_alone: bool = False) -> list[Any]:
-    """What is road as drawn: the sections, and each lanelet of those whose outline crosses itself.
-
-    Where neighbours differ in length or bend away from each other the ring around them may cross itself, and
-    what it encloses is then no longer all of them.
-    """
-    import shapely
-
-    lanelets, found = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}, []
-    for members, outline in _sections(network):
-        section = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
-        found.append(section if section.is_valid else section.buffer(0))
-        if not section.is_valid and not sections_alone:
-            lanes = [lanelets[member] for member in members]
-            rings = [np.concatenate([x.left_vertices, x.right_vertices[::-1]])[:, :2] for x in lanes]
-            # One whose left bound lies on its right is no lanelet: the drivability checker has no road there.
-            proper = [
-                ring for ring in rings if len(ring) > 2 and not shapely.is_ccw(shapely.LinearRing(ring))
-            ]
-            found += [shapely.make_valid(shapely.Polygon(ring)) for ring in proper]
-    return found
-
-
-def _sections(network: Any) -> list[tuple[list[int], Array]]:
-    """Every lane section, a lanelet with its lateral neighbours: who is in it, and its outline (V, 2)."""
-    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
-    left_over = dict.fromkeys(lanelets)
-    found = []
-    while left_over:
-        first, _ = left_over.popitem()
-        start = _neighbours(lanelets, first, True, to_the_left=False)[-1]
-        chain = _neighbours(lanelets, *start, to_the_left=True)
-        for member, _ in chain:
-            left_over.pop(member, None)
-        lines = [_bound(lanelets[chain[0][0]], chain[0][1], left=False)]
-        lines += [_bound(lanelets[member], forward, left=True) for member, forward in chain]
-        ends = np.array([line[-1] for line in lines[1:-1]]).reshape(-1, 2)
-        starts = np.array([line[0] for line in lines[-2:0:-1]]).reshape(-1, 2)
-        outline = np.concatenate((lines[0], ends, lines[-1][::-1], starts))
-        found.append(([member for member, _ in chain], outline))
-    return found
-
-
-def _neighbours(
-    lanelets: Mapping[int, Any], lanelet_id: int, forward: bool, to_the_left: bool
-) -> list[tuple[int, bool]]:
-    """The lanelet and those beside it on one side, each with whether it runs in the chain's direction."""
-    chain = [(lanelet_id, forward)]
-    seen = {lanelet_id}
-    while True:
-        lanelet = lanelets[lanelet_id]
-        if forward == to_the_left:
-            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
-        else:
-            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
-        if lanelet_id not in lanelets or lanelet_id in seen:
-            return chain
-        forward = forward == bool(same)
-        chain.append((lanelet_id, forward))
-        seen.add(lanelet_id)
-
-
-def _bound(lanelet: Any, forward: bool, left: bool) -> Array:
-    """Left or right bound (V, 2) of a lanelet, seen and ordered along the chain's direction."""
-    vertices = lanelet.left_vertices if left == forward else lanelet.right_vertices
-    return np.asarray(vertices[:: 1 if forward else -1, :2], dtype=np.float64)

@@ -1,0 +1,60 @@
+"""A path that is followed, as the checker keeps it: dense samples and what is known along them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.curves.base import Curve, FrenetTrajectory
+
+if TYPE_CHECKING:
+    from repair.curves.plane import CartesianPath
+
+__all__ = ["Followed", "is_finite", "motion_of"]
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The reference at all dense samples until ``t_end``; every check follows it for a step or two.
+
+    Attributes
+    ----------
+    reference : Curve
+    t_end : float
+        [s].
+    motion : (4, K) array
+        s, l [m] and their rates [m/s].
+    slip : (K,) array
+        Slip angle at the centre [rad].
+    heading : float
+        Of the path at the start [rad].
+    crosses : bool
+        Whether it crosses a gap of the map that is road here and none for CommonRoad's own boundary check.
+    """
+
+    reference: Curve
+    t_end: float
+    motion: Array
+    slip: Array
+    heading: float
+    crosses: bool = False
+
+
+def motion_of(trajectory: FrenetTrajectory, count: int) -> Array:
+    """The last of ``count`` samples of s, l and their rates (4, count); those before are left open."""
+    motion = np.empty((4, count))
+    start = count - len(trajectory)
+    motion[:2, start:], motion[2:, start:] = trajectory.position.T, trajectory.velocity.T
+    return motion
+
+
+def is_finite(path: CartesianPath) -> bool:
+    """Whether all of a path is."""
+    # A point or a heading that is not finite would make the longest step or the sharpest turn so.
+    if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
+        return True
+    return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))
