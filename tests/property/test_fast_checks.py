@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repair.check.limits import plane_excess, surely_kept
+from repair.check.limits import plane_accelerations, plane_excess, surely_kept
 from repair.check.peaks import peaks
 from repair.curves.bspline import UniformBSpline
 from repair.curves.plane import STANDSTILL, CartesianPath
@@ -260,6 +260,24 @@ def test_what_is_well_within_the_limits_breaks_none(seed):
     )
     if surely_kept(path, 0, limits, EGO):
         assert plane_excess(curve, samples, frame, limits, EGO, 0.0) == []
+
+
+@pytest.mark.parametrize("seed", [60, 75, 106, 371, 437, 475, *range(20)])
+def test_peaks_at_the_knots_of_the_axis_are_seen_between_samples(seed):
+    """Beside a bend the acceleration jumps where the axis' curvature changes its rate."""
+    rng = np.random.default_rng(seed)
+    along = np.arange(0.0, 80.0, rng.uniform(0.7, 2.0))
+    axis = np.column_stack([along, rng.uniform(0.3, 1.5) * np.sin(along / rng.uniform(4.0, 9.0))])
+    frame, k = FrenetFrame.from_points(axis + rng.normal(0.0, 0.02, axis.shape)), np.arange(14)
+    ahead = rng.uniform(5, 15) + k * rng.uniform(0.5, 2.5) + rng.uniform(-0.02, 0.02) * k**2
+    curve = UniformBSpline(0.0, 0.2, 3, np.column_stack([ahead, rng.uniform(-2, 2) + 0.0 * k]))
+    fine = curve.sample(np.arange(0.0, curve.t_end, 1e-3))
+    total = np.hypot(*plane_accelerations(frame, fine))
+    most = float(total.max()) - 1e-3
+    limits = SimpleNamespace(v_max=99.0, a_min=-99.0, a_max=np.inf, a_lat=99.0, a_total=most)
+    coarse = curve.sample(np.arange(int(curve.t_end / 0.05) + 1) * 0.05)
+    if fine.t[total.argmax()] <= coarse.t[-1]:
+        assert plane_excess(curve, coarse, frame, limits, EGO, 0.0)
 
 
 def test_gentle_driving_is_well_within_the_limits():

@@ -167,14 +167,16 @@ def plane_excess(
         return []
     rows = _against(samples, frame, limits, vehicle, tolerance)
     if len(samples) > 1:
-        fine = _fine(samples.t, np.logical_or.reduce([_may_exceed(value, most) for value, most, _ in rows]))
+        kinks = _kinks(frame, samples)
+        open_ = [_may_exceed(value, most, kinks * per) for value, most, _, per in rows]
+        fine = _fine(samples.t, np.logical_or.reduce(open_))
         if not len(fine):
             return []
         samples = curve.sample(fine)
         rows = _against(samples, frame, limits, vehicle, tolerance)
     return [
         Excess(float(samples.t[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
-        for value, most, text in rows
+        for value, most, text, _ in rows
         if not float(value.max()) <= most + ROUNDING
     ]
 
@@ -211,10 +213,38 @@ def vehicle_excess(t: Array, speed: Array, slip: Array, vehicle: Vehicle) -> lis
     ]
 
 
-def _may_exceed(value: Array, most: float) -> Array:
-    """Between which samples (K - 1,) a value may exceed: it swings by no more than around that interval."""
+@lru_cache(maxsize=8)
+def _bends(frame: FrenetFrame) -> Array:
+    """Sum of all jumps of the curvature's rate up to and including each of the axis' knots (K,) [1/m²]."""
+    inside = frame.s[1:-1]
+    off = 1e-6 * float(frame.s[1] - frame.s[0])
+    jumps = np.abs(frame.curvature_rate(inside + off) - frame.curvature_rate(inside - off))
+    return np.concatenate(([0.0, 0.0], np.cumsum(jumps)))
+
+
+def _kinks(frame: FrenetFrame, samples: FrenetTrajectory) -> Array:
+    """By how much the acceleration jumps between samples (K - 1,), at most [m/s²].
+
+    The axis is a cubic spline: beside it, what its curvature's rate adds to the acceleration jumps at knots.
+    """
+    (s, l), v = samples.position.T, samples.velocity[:, 0]  # noqa: E741
+    reach = np.abs(l) * v * v
+    if not np.count_nonzero(reach):
+        return np.zeros(max(len(s) - 1, 0))
+    passed = _bends(frame)[frame.s.searchsorted(s).clip(0, len(frame.s) - 1)]
+    return np.asarray(np.abs(passed[1:] - passed[:-1]) * np.maximum(reach[1:], reach[:-1]))
+
+
+def _may_exceed(value: Array, most: float, kinks: Array) -> Array:
+    """Between which samples (K - 1,) a value may exceed: it swings by no more than around that interval.
+
+    Parameters
+    ----------
+    kinks : (K - 1,) array
+        By how much it may jump in between.
+    """
     swing = np.abs(value[1:] - value[:-1])
-    around = swing.copy()
+    around = swing + kinks
     np.maximum(around[1:], swing[:-1], out=around[1:])
     np.maximum(around[:-1], swing[1:], out=around[:-1])
     return np.asarray(~(np.maximum(value[1:], value[:-1]) + around <= most))
@@ -229,20 +259,21 @@ def _fine(times: Array, chosen: Array) -> Array:
 
 def _against(
     samples: FrenetTrajectory, frame: FrenetFrame, limits: Limits, vehicle: Vehicle, tolerance: float
-) -> tuple[tuple[Array, float, str], ...]:
-    """What is measured at samples (K,), what it may be at most, and the words for it."""
+) -> tuple[tuple[Array, float, str, float], ...]:
+    """What is measured at samples (K,), what it may be at most, the words for it, and what 1 m/s² adds."""
     along, across = plane_accelerations(frame, samples)
     (s, l), (v, w) = samples.position.T, samples.velocity.T  # noqa: E741
     engine = vehicle.engine_acceleration(np.hypot((1.0 - frame.curvature(s) * l) * v, w))
     more, c = 1.0 + tolerance, limits
     return (
-        (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}"),
-        (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}"),
+        (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}", 1.0),
+        (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}", 1.0),
         (
             along / engine,
             1.0 if math.isfinite(c.a_max) else math.inf,
             "needs {:.2f} of what the engine gives at that speed, {:.2f}",
+            1.0 / float(engine.min()),
         ),
-        (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}"),
-        (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}"),
+        (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}", 1.0),
+        (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}", 1.0),
     )
