@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,8 @@ from tests.roads import car, driving, lanelet, problem, scenario, state
 
 import repair
 from repair.api import find, make
+from repair.certify.late.why import why_rows as certified
+from repair.certify.recompute import certify
 from repair.io.record_check import require_record
 from repair.report.rows.why import why_rows
 from repair.report.text import summary
@@ -35,7 +38,7 @@ def written(tmp_path, obstacles, *, own=20.0, width=7.0, more=""):
     return file
 
 
-FEW = "shooting.iterations=2"  # enough here, and a failure costs less
+FEW = "shooting.iterations=0"  # enough here, and a failure costs less
 
 
 def prepared(file, *overrides, backend="ego"):
@@ -245,6 +248,7 @@ def test_a_result_says_it_in_its_file_and_in_words(tmp_path):
     result.save(tmp_path / "out", figure=False)
     read = repair.load_result(tmp_path / "out").record
     assert read["explanation"] == json.loads(json.dumps(result.to_dict()["explanation"]))
+    assert certify(tmp_path / "out").ok
     text = summary(read, None)
     assert "in the way: obstacle 30" in text
     assert "more friction" in text
@@ -264,6 +268,33 @@ def test_an_edited_explanation_is_noticed(tmp_path, key, value):
     content["explanation"][key] = value
     with pytest.raises(ValueError, match="explanation"):
         require_record(content)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda told, friction: told.update(t_rep_s=0.2),
+        lambda told, friction: told.update(decides=["friction"]),
+        lambda told, friction: told["obstacles"][0].update(obstacle_id=7),
+        lambda told, friction: friction.update(amount=0.5, not_with=0.2, proven_too_little=0.1),
+        lambda told, friction: friction.update(amount=9.0, not_with=4.5),
+        lambda told, friction: friction.update(not_with=friction["amount"]),
+    ],
+)
+def test_a_certificate_looks_at_an_explanation_and_finds_what_is_not_so(explained_wall, edit):
+    situation, content = explained_wall
+    told = deepcopy(content)
+    assert all(row.ok for row in certified(told, situation, ""))
+    edit(told["explanation"], next(r for r in told["explanation"]["relaxations"] if r["kind"] == "friction"))
+    assert not all(row.ok for row in certified(told, situation, ""))
+
+
+@pytest.fixture(scope="module")
+def explained_wall(tmp_path_factory):
+    """A situation and its record."""
+    file = written(tmp_path_factory.mktemp("wall"), standing(30, 39.0, 0.0))
+    situation = prepared(file, "explain.kinds=[removed,friction]", "fallback=[shooting]")
+    return situation, record(situation, *explained(situation))
 
 
 def test_settings_of_an_explanation_that_nobody_asked_for_are_told(tmp_path):

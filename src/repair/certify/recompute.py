@@ -22,10 +22,11 @@ from repair.certify.certificate import Certificate, CertificateRow
 from repair.certify.clearance import boxes_kept, clearance_rows, jump_said
 from repair.certify.hull import derivative_rows, seam_rows
 from repair.certify.late.rows import late_rows
+from repair.certify.late.why import why_rows
 from repair.certify.limits import driven_rows, physical_rows, weakened
 from repair.certify.motion import Motion, States, along_curve, through_states
 from repair.certify.plane import ContactTime, contact_rows, contact_time_row, road_rows, traffic_words
-from repair.certify.record import record_rows, searched_again
+from repair.certify.record import other_versions, record_rows, searched_again
 from repair.certify.solution import (
     agreement_rows,
     columns_row,
@@ -59,8 +60,8 @@ def certify(folder: Path) -> Certificate:
     """
     folder = Path(folder)
     content = read_record(folder)
-    proven = bool((content.get("bound") or {}).get("proof_file"))
-    if content.get("solution_file") is None and not proven:
+    said = bool((content.get("bound") or {}).get("proof_file") or content.get("explanation"))
+    if content.get("solution_file") is None and not said:
         raise RepairError(
             f"{folder} holds no trajectory to certify: "
             f"{content.get('status_sentence', content.get('status'))}"
@@ -127,6 +128,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     rows += agreement_rows(states, planned, scene.vehicle, dt, first)
     rows += _record_rows(content, prepared, curve, states, traffic)
     rows += late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
+    rows += why_rows(content, prepared, other_versions(content))
     gap, kept = float(prepared.config.checker.road_gap), all(row.ok for row in road)
     rows += official_rows(file, scene.official(), problem, on_road=kept, gap=gap, goal=_claims_goal(content))
     return Certificate(
@@ -142,7 +144,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
 
 
 def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
-    """Of a result without a trajectory: what it says about when it is too late."""
+    """Of a result without a trajectory: what it says about when it is too late, and why."""
     from repair.scene.reading import read_file
 
     path, prepared = _prepare(folder, content)
@@ -150,6 +152,7 @@ def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
     problem = anew.problems[scene.planning_problem_id]
     traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
     rows = late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
+    rows += why_rows(content, prepared, other_versions(content))
     scenario, backend, status = (str(content.get(name)) for name in ("scenario", "backend", "status"))
     words = traffic_words(traffic)
     return Certificate(folder, scenario, backend, status, None, tuple(rows), *_under(prepared), words)

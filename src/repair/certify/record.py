@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from repair.preparation import Prepared
     from repair.search.result import SearchResult
 
-__all__ = ["Again", "differences", "record_rows", "searched_again"]
+__all__ = ["Again", "differences", "other_versions", "record_rows", "searched_again"]
 
 #: What a run is free to differ in: times of the clock, versions, names of files, iterations.
 _FREE = frozenset(
     {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
      "scenario_file_problem", "modes", "drawing_file", "provenance",
-     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound"}
+     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound", "explanation"}
 )  # fmt: skip
 #: What follows from the scenario, the configuration and the curve alone. Not how it ends: a stop is driven on
 #: from the curve's very end, and makes more of its last digits than they say.
@@ -56,6 +56,21 @@ class Again:
     other: str = ""
 
 
+def other_versions(content: Mapping[str, Any]) -> str:
+    """Which packages are installed in other versions than a result was made with, in words."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    def here(name: str) -> str | None:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            return None
+
+    told = content.get("versions") or {}
+    names = sorted(n for n, v in told.items() if n != "python" and v != here(n))
+    return f"made with other versions of {', '.join(names)}" if names else ""
+
+
 def searched_again(content: Mapping[str, Any], prepared: Prepared, curve: Curve | None) -> Again:
     """Search again, and work out beside it what needs no search.
 
@@ -68,19 +83,9 @@ def searched_again(content: Mapping[str, Any], prepared: Prepared, curve: Curve 
     curve : Curve or None
         The repaired curve in ``content``.
     """
-    from importlib.metadata import PackageNotFoundError, version
-
     from repair.search.result import SearchResult, SearchStatus
 
-    def here(name: str) -> str | None:
-        try:
-            return version(name)
-        except PackageNotFoundError:
-            return None
-
-    told = content.get("versions") or {}
-    names = sorted(n for n, v in told.items() if n != "python" and v != here(n))
-    other = f"made with other versions of {', '.join(names)}" if names else ""
+    other = other_versions(content)
     status = SearchStatus.NO_CONFLICT if curve is None else SearchStatus.FOUND
     f_ttr = float("inf") if curve is None else float(content["f_ttr_s"])
     direct = _record(prepared, SearchResult(status, prepared.conflict, f_ttr, curve))

@@ -106,25 +106,22 @@ _TRAJECTORY: dict[str, Test] = {
 _DETAIL: Mapping[str, Test] = {
     "reason": _text, "t_s": _maybe(_number), "detail": _text, "obstacle_id": _maybe(_whole),
 }  # fmt: skip
+_RELAXATION: Mapping[str, Test] = {
+    **dict.fromkeys(("kind", "status", "unit", "detail"), _text),
+    **dict.fromkeys(("obstacle_id", "obstacle_index"), _maybe(_whole)),
+    **dict.fromkeys(("amount", "not_with", "proven_too_little", "tried_up_to"), _maybe(_number)),
+    "found_by": _maybe(_text),
+}
 _EXPLANATION: Mapping[str, Test] = {
     "t_rep_s": _number,
-    "asked": _list_of(_text),
     "exists_by": _maybe(_text),
-    "proven": _flag,
-    "decides": _list_of(_text),
+    **dict.fromkeys(("asked", "decides", "not_tried"), _list_of(_text)),
+    **dict.fromkeys(("proven", "obstacles_minimal", "obstacles_proven", "road_in_proof", "complete"), _flag),
     "obstacles": _maybe(
         _list_of(_all_of({"obstacle_id": _whole, "from_s": _maybe(_number), "to_s": _maybe(_number)}))
     ),
-    "relaxations": _list_of(
-        _all_of({
-            "kind": _text, "obstacle_id": _maybe(_whole), "status": _text, "amount": _maybe(_number),
-            "unit": _text, "not_with": _maybe(_number), "proven_too_little": _maybe(_number),
-            "tried_up_to": _maybe(_number), "found_by": _maybe(_text), "detail": _text,
-        })
-    ),
-    **dict.fromkeys(("obstacles_minimal", "obstacles_proven", "road_in_proof", "complete"), _flag),
-    "not_tried": _list_of(_text),
-}  # fmt: skip
+    "relaxations": _list_of(_all_of(_RELAXATION)),
+}
 _TERMINAL: Mapping[str, Test] = {
     "ending": lambda value: value in ("safe", "safe_unless_extended", "unsafe"),
     "sentence": _text,

@@ -44,6 +44,7 @@ def _relaxation(one: Relaxation) -> dict[str, Any]:
     return {
         "kind": one.kind,
         "obstacle_id": one.obstacle_id,
+        "obstacle_index": one.index,
         "status": one.status,
         "amount": number(one.amount),
         "unit": KINDS[one.kind].unit,

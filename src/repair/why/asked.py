@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from repair.backend.base import RepairBackend
@@ -60,6 +61,28 @@ class Asked:
     def spent(self) -> float:
         """Processor time until now [s]."""
         return time.thread_time() - self.begin
+
+    @contextmanager
+    def within(self, share: float) -> Iterator[None]:
+        """Leave a share of the time that is left to what is done inside of a ``with`` block."""
+        whole = self.limit
+        self.limit = self.spent + min(share, 1.0) * max(whole - self.spent, 0.0)
+        try:
+            yield
+        finally:
+            self.limit = whole
+
+    def drop(self, name: str) -> None:
+        """Do not ask a backend any more."""
+        del self.backends[name]
+
+    def spare(self) -> None:
+        """Ask nobody's helpers that are asked themselves."""
+        for backend in self.backends.values():
+            can = backend.capabilities
+            helpers = {name: made for name, made in can.helpers.items() if name not in self.backends}
+            if len(helpers) < len(can.helpers):
+                backend.capabilities = replace(can, helpers=helpers)
 
     @property
     def late(self) -> bool:

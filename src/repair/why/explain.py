@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from repair.backend.base import RepairBackend
+from repair.config.schema import Config
 from repair.preparation import Prepared
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import ExplainConfig
@@ -20,6 +22,7 @@ __all__ = ["Explanation", "explain", "explained_time"]
 
 _ORACLE = "shooting"
 _SET = 0.4  # share of the time that the set of obstacles may take
+_EACH = 2.0  # times the time that is left for each kind, as long as others take less
 _CHANGED = 3  # obstacles that are changed, at most
 
 
@@ -122,6 +125,16 @@ def explain(
     return _Explained(prepared, t_rep, settings, on_progress or (lambda words: None)).explanation()
 
 
+def _backends(config: Config) -> dict[str, RepairBackend]:
+    """Who is asked, by name: the cheap ones first, and the members of one that is made of several."""
+    made = make_backend(config.backend, config)
+    members = made.capabilities.members
+    chosen = {config.backend: made} if members is None else dict(members())
+    cheap = dict.fromkeys((*fallbacks_of(config.backend, config), _ORACLE))
+    first = {name: make_backend(name, config) for name in cheap if name not in chosen}
+    return {**first, **{name: chosen.pop(name) for name in cheap if name in chosen}, **chosen}
+
+
 class _Explained:
     """The parts, one after the other, as far as the time goes."""
 
@@ -129,11 +142,7 @@ class _Explained:
         self, prepared: Prepared, t_rep: float, settings: ExplainConfig, tell: Callable[[str], None]
     ) -> None:
         self.prepared, self.settings, self.tell = prepared, settings, tell
-        config = prepared.config
-        names = dict.fromkeys(
-            (*fallbacks_of(config.backend, config), _ORACLE, config.backend)
-        )  # the cheap ones first
-        self.asked = Asked(t_rep, {name: make_backend(name, config) for name in names}, settings.time_limit)
+        self.asked = Asked(t_rep, _backends(prepared.config), settings.time_limit)
 
     def explanation(self) -> Explanation:
         """All that is found out in time."""
@@ -148,9 +157,9 @@ class _Explained:
         if not asked.backends:
             return self._told(exists, False, None, (), ())
         self.tell("which obstacles are in the way")
-        whole, asked.limit = asked.limit, asked.spent + _SET * (asked.limit - asked.spent)
-        blocks = blocking(self.prepared, asked, proof)
-        asked.limit = whole
+        asked.spare()
+        with asked.within(_SET):
+            blocks = blocking(self.prepared, asked, proof)
         found, late = self._relaxations(blocks)
         return self._told(exists, proof is not None, blocks, tuple(found), tuple(late))
 
@@ -161,7 +170,7 @@ class _Explained:
             found = self.asked.by(name, backend, self.prepared)
             if found is not None:
                 exists = exists or found.by
-                del self.asked.backends[name]
+                self.asked.drop(name)
         return exists
 
     def _relaxations(self, blocks: Blocking) -> tuple[list[Relaxation], list[str]]:
@@ -169,7 +178,8 @@ class _Explained:
         found: list[Relaxation] = []
         late: list[str] = []
         helps: set[int] = set()  # who has to be there for there being no repair
-        for name in [kind for kind in KINDS if kind in self.settings.kinds]:
+        wanted = [kind for kind in KINDS if kind in self.settings.kinds]
+        for number, name in enumerate(wanted):
             kind = KINDS[name]
             places: list[int | None] = [None]
             if kind.of_obstacle:
@@ -178,7 +188,8 @@ class _Explained:
                     places = [k for k in places if k in helps]
             for index in places:
                 self.tell(f"{name}" + ("" if index is None else f" of an obstacle ({index})"))
-                one = smallest(self.prepared, self.asked, name, index)
+                with self.asked.within(_EACH / (len(wanted) - number)):
+                    one = smallest(self.prepared, self.asked, name, index)
                 if one.status == "cut":
                     late += [name] if name not in late else []
                     continue

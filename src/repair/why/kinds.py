@@ -208,11 +208,7 @@ def _wider(bounds: LateralBounds, by: float) -> LateralBounds:
 
 def _wider_edge(edge: RoadEdge, by: float) -> RoadEdge:
     """The edge of a road that reaches farther by ``by`` [m] on all sides."""
-    import shapely
-
-    boundary: Any = copy.copy(edge.boundary)
-    boundary.region = shapely.buffer(edge.boundary.region, by)
-    shapely.prepare(boundary.region)
+    boundary = edge.boundary.widened(by)
     return replace(edge, boundary=boundary, corridor=RoadCorridor(boundary, edge.frame, edge.vehicle))
 
 

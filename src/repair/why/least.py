@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from repair.preparation import Prepared
@@ -29,7 +30,8 @@ class Relaxation:
     amount : float or None
         The smallest that was found to suffice; None without one, and where there is no amount.
     half : float or None
-        Half of it (in whole steps), with which nobody finds a repair.
+        Half of it (in whole steps), with which nobody finds a repair; None where the time was up before that
+        was looked at, so that less may suffice.
     proven : float or None
         With this much of it there is none: proven. None where nothing was proven, or where more of the kind
         may allow less.
@@ -85,15 +87,33 @@ class _Trial:
         return self.known[n] is not None
 
     def smallest(self) -> int | None:
-        """The smallest number of steps that suffices, of which half do not; None where none does."""
-        low, high = self._enclosed()
-        if high is None:
-            return None
-        while True:
-            high = _bisected(low, high, self.enough)
-            if not self.enough(high // 2):
-                return high
-            low, high = 0, high // 2
+        """The smallest number of steps that suffices, of which half do not; None where none does.
+
+        Where the time is up before, the smallest of those that are known to suffice.
+
+        Raises
+        ------
+        Cut
+            If the time is up and none is known.
+        """
+        try:
+            low, high = self._enclosed()
+            if high is None:
+                return None
+            while True:
+                high = _bisected(low, high, self.enough)
+                if not self.enough(high // 2):
+                    return high
+                low, high = 0, high // 2
+        except Cut:
+            good = [n for n, found in self.known.items() if found is not None]
+            if not good:
+                raise
+            return min(good)
+
+    def half(self, n: int) -> float | None:
+        """Half of a number of steps as an amount; None where nobody has looked."""
+        return self.amount(n // 2) if n // 2 in self.known else None
 
     def prove(self, high: int) -> None:
         """Find the largest number of steps below ``high`` that is proven to be too few."""
@@ -147,7 +167,8 @@ def smallest(prepared: Prepared, asked: Asked, name: str, index: int | None = No
             status = "sufficient" if found is not None else "not_sufficient"
             return Relaxation(name, status, who, index, by="" if found is None else found.by)
         n = trial.smallest()
-        trial.prove(trial.count + 1 if n is None else n)
+        with suppress(Cut):
+            trial.prove(trial.count + 1 if n is None else n)
     except Cut:
         return Relaxation(name, "cut", who, index)
     except ValueError as why:
@@ -158,6 +179,4 @@ def smallest(prepared: Prepared, asked: Asked, name: str, index: int | None = No
         return Relaxation(name, "not_sufficient", who, index, proven=proven, most=most)
     found = trial.known[n]
     assert found is not None
-    return Relaxation(
-        name, "sufficient", who, index, trial.amount(n), trial.amount(n // 2), proven, most, found.by
-    )
+    return Relaxation(name, "sufficient", who, index, trial.amount(n), trial.half(n), proven, most, found.by)

@@ -6,6 +6,7 @@ Without closed gaps the verdicts are at least as strict as those of the drivabil
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property, lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,19 @@ _BOX = 4.0
 _MOST = 32
 # The corners of a box with sides (back, right, front, left).
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
+
+
+def _beyond(region: Any, sections: Any) -> Any:
+    """What of a region is in no section, prepared for questions; None where that is rounding."""
+    import shapely
+
+    parts = shapely.get_parts(shapely.difference(region, sections))
+    parts = parts[shapely.area(parts) > _SLIVER]
+    if not len(parts):
+        return None
+    gaps = shapely.union_all(parts)
+    shapely.prepare(gaps)
+    return gaps
 
 
 class RoadBoundary:
@@ -109,13 +123,18 @@ class RoadBoundary:
         import shapely
 
         sections = shapely.union_all(outlines(self._scenario.lanelet_network, sections_alone=True))
-        parts = shapely.get_parts(shapely.difference(self.region, sections))
-        parts = parts[shapely.area(parts) > _SLIVER]
-        if not len(parts):
-            return None
-        gaps = shapely.union_all(parts)
-        shapely.prepare(gaps)
-        return gaps
+        return _beyond(self.region, sections)
+
+    def widened(self, by: float) -> RoadBoundary:
+        """The road as it would be if every section of it reached farther by ``by`` [m] on all sides."""
+        import shapely
+
+        wider, gaps = copy(self), self._gaps
+        sections = self.region if gaps is None else shapely.difference(self.region, gaps)
+        wider.region = shapely.buffer(self.region, by)
+        shapely.prepare(wider.region)
+        wider._gaps = None if gaps is None else _beyond(wider.region, shapely.buffer(sections, by))
+        return wider
 
     def bridged(self, near: Any = None) -> list[Bridge]:
         """The gaps and holes of the map that count as road.

@@ -93,13 +93,20 @@ def _helping(relaxations: list[dict[str, Any]]) -> list[str]:
         if one["kind"] == "removed":
             of_obstacle.setdefault(one["obstacle_id"], []).append("gone")
             continue
-        words = _MORE[one["kind"]].format(f"{one['amount']:g}") + f" (not with {one['not_with']:g}"
-        words += f"; proven: not with {one['proven_too_little']:g})" if one["proven_too_little"] else ")"
+        words = _MORE[one["kind"]].format(f"{one['amount']:g}") + f" ({_less(one)})"
         if one["obstacle_id"] is not None:
             of_obstacle.setdefault(one["obstacle_id"], []).append(words)
         else:
             parts.append(words)
     return parts + [f"obstacle {name} {', or '.join(words)}" for name, words in of_obstacle.items()]
+
+
+def _less(one: dict[str, Any]) -> str:
+    """With how much less there is none."""
+    text = f"not with {one['not_with']:g}" if one["not_with"] is not None else "less was not tried"
+    if one["proven_too_little"]:
+        text += f"; proven: not with {one['proven_too_little']:g}"
+    return text
 
 
 def _much(one: dict[str, Any]) -> str:
