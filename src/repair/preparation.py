@@ -34,17 +34,22 @@ from repair.scene.scene import Scene
 from repair.scene.settings import LOADING, SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
 from repair.situation import Situation
+from repair.solvers.registry import sections
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.vehicle.parameters import Vehicle
 from repair.world.occupancy import build_occupancy, shrink_to_start
 
-__all__ = ["Phases", "Prepared", "among", "laid_out", "prepare"]
+__all__ = ["Phases", "Prepared", "again_for", "among", "laid_out", "prepare", "what_matters"]
 
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
 _BODY_MARGIN = 0.1
 # What CommonRoad's drivability checker judges as well.
 _JUDGED = {Reason.KINEMATICS.value, Reason.LIMITS.value}
+# What is asked of something prepared, and changes nothing about it; nor do the sections of the backends.
+_ASKED_LATER = {
+    "scenario", "driver", "backend", "fallback", "metrics", "search", "evasive", "bound", "for_backend",
+}  # fmt: skip
 
 
 @dataclass
@@ -121,6 +126,32 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
         if chosen is not None and SOURCES[config.reference.source].becomes_ego:
             scene = as_ego(scene, chosen)
     return laid_out(scene, config, given, phases)
+
+
+def what_matters(config: Config) -> dict[str, Any]:
+    """The part of a configuration that a preparation depends on.
+
+    Where it is the same, so is what is prepared. Everything that is not known to be asked later counts.
+    """
+    return {key: value for key, value in config.to_dict().items() if key not in _ASKED_LATER | {*sections()}}
+
+
+def again_for(prepared: Prepared, config: Config) -> Prepared:
+    """What is prepared, for another backend, search or metrics: as :func:`prepare` would make it again.
+
+    Nothing that a search has kept is handed on, so that each search begins alike.
+
+    Raises
+    ------
+    ConfigError
+        If the configurations differ in what matters.
+    """
+    require_types(config)
+    before, config = prepared.config, _agreed(prepared.scene, config)
+    if what_matters(before) != what_matters(config):
+        raise ConfigError("what is prepared was prepared with other settings; prepare it again")
+    said = prepared.notes[: len(prepared.notes) - len(_no_effect(before))]
+    return replace(prepared, config=config, notes=(*said, *_no_effect(config)))
 
 
 def among(prepared: Prepared, obstacles: tuple[Obstacle, ...]) -> Prepared:
@@ -287,10 +318,15 @@ def _bridged(checker: Checker, places: Array) -> list[str]:
 
 def _remarks(config: Config, wanted: float, t_reference: float) -> list[str]:
     """Settings that were made on purpose and change nothing here."""
-    remarks = [f"{key} has no effect with {other}={value}" for key, other, value in config.without_effect()]
+    remarks = []
     if config.repair.horizon is not None and wanted > t_reference + INSTANT:
         remarks.append(
             f"repair.horizon is {wanted:g} s, but what is known ends at {t_reference:g} s, "
             "and so do the repairs"
         )
-    return remarks
+    return [*remarks, *_no_effect(config)]
+
+
+def _no_effect(config: Config) -> list[str]:
+    """Those that the configuration alone tells."""
+    return [f"{key} has no effect with {other}={value}" for key, other, value in config.without_effect()]

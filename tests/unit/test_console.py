@@ -226,7 +226,7 @@ def no_work(monkeypatch):
         pytest.fail("it has begun")
 
     monkeypatch.setattr("repair.api.repair", begun)
-    monkeypatch.setattr("repair.study.run._Worker.give", begun)
+    monkeypatch.setattr("repair.study.run.run_study", begun)
 
 
 @pytest.mark.usefixtures("no_work")

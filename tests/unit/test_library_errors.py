@@ -541,5 +541,5 @@ def test_the_official_checker_needs_none_either(written):
     ],
 )
 def test_a_sweep_says_what_is_wrong_before_the_work(keys, words, path, monkeypatch):
-    monkeypatch.setattr("repair.study.run._Worker.give", lambda *_: pytest.fail("it has begun"))
+    monkeypatch.setattr("repair.study.run.run_study", lambda *_, **__: pytest.fail("it has begun"))
     assert words in refused(lambda: sweep(path.parent, replace(SweepSettings(), **keys)))

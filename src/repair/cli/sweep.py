@@ -23,10 +23,16 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="extend", nargs="+", default=[], dest="overrides"
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, help="write sweep.csv and sweep.json")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="worker processes")
     parser.add_argument(
-        "--timeout", type=float, default=300.0, metavar="S", help="wall time for one file [s]"
+        "--out",
+        metavar="DIR",
+        type=Path,
+        help="store each row as it comes, in study.sqlite, and write sweep.csv and sweep.json",
+    )
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="worker processes")
+    parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="wall time for one row [s]")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the rows that are stored in --out DIR"
     )
     parser.add_argument("--report", metavar="FILE.md", type=Path, help="write a report of the rows")
     parser.add_argument(
@@ -40,9 +46,9 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
 def sweep(arguments: argparse.Namespace) -> int:
     """Every file, backend and reference; prints the rows as CSV where no folder is given."""
     from repair.io.destination import require_folder
+    from repair.study.export import write_sweep
     from repair.study.rows import COLUMNS, SweepSettings
     from repair.study.run import sweep as run_sweep
-    from repair.study.store import write_sweep
 
     if arguments.jobs < 1:
         raise UsageError(f"--jobs is {arguments.jobs}; at least one worker process is needed")
@@ -60,7 +66,9 @@ def sweep(arguments: argparse.Namespace) -> int:
         require_folder(target)
     if arguments.report is not None and arguments.report.is_dir():
         raise UsageError(f"the report {arguments.report} is a folder; the name of a file is wanted")
-    rows = run_sweep(arguments.folder, settings)
+    if arguments.resume and arguments.out is None:
+        raise UsageError("--resume goes on with what is stored in a folder; name it with --out")
+    rows = run_sweep(arguments.folder, settings, out=arguments.out, resume=arguments.resume)
     if arguments.report is not None:
         from repair.io.files import write_files
         from repair.report.sweep import sweep_report

@@ -1,12 +1,17 @@
-"""What a sweep does with each file, and the row that comes of it."""
+"""The rows of a sweep or a study: which columns there are, and of which type each is."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["COLUMNS", "SweepSettings", "combinations", "failed_row", "one_line"]
+from repair.errors import RepairError, in_words
+
+__all__ = [
+    "COLUMNS", "STUDY_COLUMNS", "SweepSettings", "as_sweep_row", "combinations", "failed_row", "one_line",
+    "strict", "type_of", "volatile",
+]  # fmt: skip
 
 COLUMNS = (
     "file", "backend", "reference", "status", "detail", "conflict", "margin_only", "obstacle_id",
@@ -20,6 +25,65 @@ COLUMNS = (
     "road_method", "certificate", "load_time_s", "prepare_time_s", "search_time_s", "solve_time_s",
     "check_time_s", "official_time_s",
 )  # fmt: skip
+
+_ONLY_IN_STUDIES = (
+    "variation", "ttb_status", "ttr_status", "contact_obstacle_id", "t_end_s", "build_time_s", "other_time_s",
+    "evasive_time_s", "row_time_s", "worker_peak_memory_mb",
+)  # fmt: skip
+#: What is stored for each row of a study; the resolved settings that vary stand beside it.
+STUDY_COLUMNS = (*COLUMNS, *_ONLY_IN_STUDIES)
+
+_WHOLE = {"obstacle_id", "contact_obstacle_id"}
+_TRUTH = {
+    "margin_only", "from_behind", "by_fallback", "onward_reached",
+    *(name for name in COLUMNS if name.startswith("official_") and not name.endswith("_s")),
+}  # fmt: skip
+_FIGURE = ("_s", "_mps", "_mps2", "_mb", "_residual")
+
+
+def type_of(column: str) -> type:
+    """``bool``, ``int``, ``float`` or ``str``: what a column holds where it holds anything."""
+    if column in _TRUTH:
+        return bool
+    if column in _WHOLE:
+        return int
+    return float if column.endswith(_FIGURE) else str
+
+
+def volatile(column: str) -> bool:
+    """Whether a column says how long something took, or how much memory: another one in each run."""
+    return column.endswith(("_time_s", "_memory_mb"))
+
+
+def strict(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with every column of a study, each of its type or None; no infinity.
+
+    Raises
+    ------
+    RepairError
+        If a value is of another type: a defect of whoever made the row.
+    """
+    made: dict[str, Any] = {}
+    for column in STUDY_COLUMNS:
+        value, wanted = row.get(column), type_of(column)
+        if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if value is not None and (type(value) is not wanted or value in (float("inf"), -float("inf"))):
+            raise RepairError(
+                f"column {column} holds {in_words(value)}; it takes {wanted.__name__} or nothing"
+            )
+        made[column] = value
+    return made
+
+
+def as_sweep_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of a study as ``sweep.csv`` has always had it: infinite times by CriMe's convention, in words."""
+    made = {column: row[column] for column in COLUMNS}
+    for name in ("ttb", "ttr"):
+        status = row[f"{name}_status"]
+        if status not in (None, "found"):
+            made[f"{name}_s"] = "inf" if status == "no_conflict" else "-inf"
+    return made
 
 
 @dataclass(frozen=True)
@@ -37,7 +101,7 @@ class SweepSettings:
     certify : bool
         Write each result and recompute its margins from the files (:func:`repair.certify.recompute.certify`).
     timeout : float
-        Wall time for one file [s], all backends and references together.
+        Wall time for one row [s].
     jobs : int
         Worker processes.
     """
@@ -59,7 +123,7 @@ def combinations(settings: SweepSettings) -> list[tuple[str, str]]:
 
 def failed_row(file: str, backend: str, reference: str, status: str, detail: str) -> dict[str, Any]:
     """The row of what could not be run, with the reason."""
-    row: dict[str, Any] = dict.fromkeys(COLUMNS)
+    row: dict[str, Any] = dict.fromkeys(STUDY_COLUMNS)
     row.update(file=file, backend=backend, reference=reference, status=status, detail=detail)
     return row
 

@@ -1,114 +1,188 @@
-"""Many scenarios, many backends: each file through reference, TTC, search and the official checker.
-
-A row for every (file, backend, reference), whatever happens: a file that does not load, a crash of
-the interpreter or a time-out is a row that says so. Work is done by worker processes that are
-replaced when they die or hang; rows come out in the order of the files, whatever the number of
-workers.
-"""
+"""A study from beginning to end: what is there is kept, the rest is made and written row by row."""
 
 from __future__ import annotations
 
-import multiprocessing
 import sys
+import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
-from repair.config import load_config
 from repair.errors import RepairError, in_words
-from repair.study.rows import SweepSettings, combinations, failed_row
-from repair.study.task import run_file
+from repair.study.engine import Lanes, LocalLanes, rows_of
+from repair.study.plan import Study, Task, tasks_of
+from repair.study.rows import SweepSettings, as_sweep_row
+from repair.study.store import Store
 
-__all__ = ["require_settings", "sweep"]
+__all__ = ["Progress", "Ran", "estimate", "require_settings", "run_study", "sweep", "sweep_study"]
 
-
-# -- workers ---------------------------------------------------------------------------------------
-
-
-def _serve(pipe: Any, settings: SweepSettings) -> None:
-    """Worker: rows for every path that comes down the pipe, until None comes."""
-    while (path := pipe.recv()) is not None:
-        pipe.send(run_file(Path(path), settings))
+_TOLD_EVERY = 30.0  # how often there is a line of progress where nobody watches a bar [s]
 
 
-class _Worker:
-    """A process that can be asked, waited for, and replaced."""
+@dataclass(frozen=True)
+class Ran:
+    """What came of a run.
 
-    def __init__(self, settings: SweepSettings) -> None:
-        self.settings = settings
-        self.process: Any = None
-        self.task: int | None = None
-        self.deadline = 0.0
+    Attributes
+    ----------
+    tasks, before, made : int
+        Rows of the study; those that were there; those that were made now.
+    """
 
-    def give(self, index: int, path: Path) -> None:
-        if self.process is None or not self.process.is_alive():
-            context = multiprocessing.get_context("spawn")
-            self.pipe, theirs = context.Pipe()
-            self.process = context.Process(target=_serve, args=(theirs, self.settings), daemon=True)
-            self.process.start()
-            theirs.close()
-        self.pipe.send(str(path))
-        self.task, self.deadline = index, time.monotonic() + self.settings.timeout
+    tasks: int
+    before: int
+    made: int
 
-    def collect(self) -> list[dict[str, Any]] | str | None:
-        """Rows, or what became of the worker, or None while it is busy."""
-        try:
-            if self.pipe.poll(0.02):
-                return self.pipe.recv()  # type: ignore[no-any-return]
-        except (EOFError, OSError):
-            self.stop()
-            return f"the worker process ended with exit code {self.process.exitcode}"
-        if time.monotonic() > self.deadline:
-            self.stop()
-            return f"no answer within {self.settings.timeout:g} s"
-        return None
+    @property
+    def left(self) -> int:
+        """Rows that are not there yet."""
+        return self.tasks - self.before - self.made
 
-    def stop(self) -> None:
-        if self.process is not None:
-            if self.process.is_alive():
-                self.process.kill()
-            self.process.join(5.0)
+
+class Progress:
+    """A bar on a terminal, and elsewhere a line every half a minute.
+
+    Parameters
+    ----------
+    total, before : int
+        Rows to be there at the end, and at the beginning.
+    shown : bool, optional
+        Whether anything is to be seen; by default it is.
+    """
+
+    def __init__(self, total: int, before: int = 0, shown: bool | None = None) -> None:
+        from tqdm import tqdm
+
+        stream = sys.stderr
+        terminal = stream is not None and stream.isatty()
+        self.lines = shown is not False and not terminal
+        hidden = shown is False or not terminal
+        self.bar = tqdm(total=total, initial=before, disable=hidden, unit="row", leave=False)
+        self.total, self.before, self.made, self.broken = total, before, 0, 0
+        self.begin = self.told = time.monotonic()
+
+    def row(self, status: str) -> None:
+        """One more."""
+        self.made += 1
+        self.broken += status in ("crash", "timeout", "memory", "input_error")
+        self.bar.update()
+        self.idle()
+
+    def idle(self) -> None:
+        """Tell, if it is time to."""
+        now = time.monotonic()
+        if self.lines and now - self.told >= _TOLD_EVERY:
+            self.told = now
+            print(self.words(now - self.begin), file=sys.stderr, flush=True)
+
+    def words(self, spent: float) -> str:
+        """How far it is."""
+        there = self.before + self.made
+        left = f", about {spent / self.made * (self.total - there):.0f} s left" if self.made else ""
+        failed = f", {self.broken} could not be run" if self.broken else ""
+        return f"repair: {there} of {self.total} rows{failed}{left}"
+
+    def close(self) -> None:
+        """Take the bar away."""
+        self.bar.close()
+
+
+def run_study(
+    tasks: Sequence[Task],
+    store: Store,
+    lanes: Lanes,
+    *,
+    limit: int | None = None,
+    progress: bool | None = None,
+) -> Ran:
+    """Make the rows that the store does not have.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    store : Store
+    lanes : Lanes
+        What works; closed at the end.
+    limit : int, optional
+        Make at most as many rows.
+    progress : bool, optional
+        Whether it is told how far it is.
+
+    Raises
+    ------
+    OutputError
+        If a row cannot be written.
+    """
+    store.plan(tasks)
+    there = store.done()
+    missing = {task.key: task for task in tasks if task.key not in there}
+    wanted = list(missing.values())[:limit]
+    before = len(tasks) - len(missing)
+    if not wanted:
+        lanes.close()
+        return Ran(len(tasks), before, 0)
+    shown = Progress(before + len(wanted), before, progress)
+    try:
+        for task, (row, whole) in rows_of(wanted, lanes, idle=shown.idle):
+            store.add(task, row, whole)
+            shown.row(row["status"])
+    finally:
+        shown.close()
+    return Ran(len(tasks), before, shown.made)
+
+
+def estimate(tasks: Sequence[Task], store: Store | None, workers: int) -> tuple[int, float | None]:
+    """How many rows are there, and how long the others will take [s]; None where no row says anything.
+
+    A row takes as long as those of its backend and variation have taken, else those of its backend, else all.
+    """
+    if store is None:
+        return 0, None
+    there = store.done()
+    query = "SELECT backend, variation, row_time_s FROM rows WHERE row_time_s IS NOT NULL"
+    known: dict[tuple[str, ...], list[float]] = {}
+    for row in store.base.execute(query):
+        for name in ((row["backend"], row["variation"]), (row["backend"],), ()):
+            known.setdefault(name, []).append(row["row_time_s"])
+    if not known:
+        return sum(task.key in there for task in tasks), None
+    means = {name: fmean(times) for name, times in known.items()}
+    seconds = sum(
+        means.get((task.backend, task.variation), means.get((task.backend,), means[()]))
+        for task in tasks
+        if task.key not in there
+    )
+    return sum(task.key in there for task in tasks), seconds / max(workers, 1)
+
+
+# -- a sweep is a study of one folder ---------------------------------------------------------------
 
 
 def require_settings(settings: SweepSettings) -> None:
-    """See that every backend can be made, every reference is known, and there is somebody to do the work.
+    """See that the settings of a sweep make sense; what they name is seen to by :func:`sweep_study`.
 
     Raises
     ------
     RepairError
         Naming what is wrong.
     """
-    from repair.solvers.registry import make_backend
-
     if not settings.jobs >= 1:
         raise RepairError(f"jobs is {settings.jobs}; a sweep takes at least one worker process")
     if not settings.timeout > 0.0:
         raise RepairError(f"timeout is {settings.timeout:g} s; it has to be positive")
-    for backend, reference in combinations(settings):
-        overrides = [*settings.overrides, f"reference.source={reference}"]
-        make_backend(backend, load_config(settings.preset, overrides=overrides, backend=backend))
 
 
-def sweep(folder: Path, settings: SweepSettings, *, progress: bool | None = None) -> list[dict[str, Any]]:
-    """Run over all ``*.xml`` files of a folder.
-
-    Parameters
-    ----------
-    folder : Path
-    settings : SweepSettings
-    progress : bool, optional
-        Show a progress bar; by default only on a terminal.
-
-    Returns
-    -------
-    list of dict
-        Rows with the keys :data:`COLUMNS`, in the order of the files.
+def sweep_study(folder: Path, settings: SweepSettings) -> Study:
+    """The study of all ``*.xml`` files of a folder.
 
     Raises
     ------
     RepairError
-        If the folder has no scenario files, or the settings ask for what there is not: before any work.
+        If the folder has no scenario files.
     """
     require_settings(settings)
     try:
@@ -117,39 +191,48 @@ def sweep(folder: Path, settings: SweepSettings, *, progress: bool | None = None
         raise RepairError(f"the folder {folder} cannot be read: {in_words(error)}") from error
     if not files:
         raise RepairError(f"{folder} is not a folder with CommonRoad scenario files (*.xml)")
-    from tqdm import tqdm
-
-    rows: list[list[dict[str, Any]]] = [[] for _ in files]
-    workers = [_Worker(settings) for _ in range(settings.jobs)]
-    waiting = iter(range(len(files)))
-    shown = sys.stderr.isatty() if progress is None else progress
-    with tqdm(total=len(files), disable=not shown, unit="file", leave=False) as bar:
-        try:
-            for worker in workers:
-                _next(worker, waiting, files)
-            while any(w.task is not None for w in workers):
-                for worker in workers:
-                    if worker.task is None or (answer := worker.collect()) is None:
-                        continue
-                    name = files[worker.task].name
-                    if isinstance(answer, str):
-                        status = "timeout" if answer.startswith("no answer") else "crash"
-                        answer = [
-                            failed_row(name, b, r, status, answer_text)
-                            for b, r in combinations(settings)
-                            for answer_text in (answer,)
-                        ]
-                    rows[worker.task] = answer
-                    bar.update()
-                    _next(worker, waiting, files)
-        finally:
-            for worker in workers:
-                worker.stop()
-    return [row for group in rows for row in group]
+    return Study(
+        tuple(files), tuple(dict.fromkeys(settings.backends)), tuple(dict.fromkeys(settings.references)),
+        preset=settings.preset, settings=settings.overrides, official=settings.official,
+        certify=settings.certify, timeout=settings.timeout,
+    )  # fmt: skip
 
 
-def _next(worker: _Worker, waiting: Iterable[int], files: Sequence[Path]) -> None:
-    worker.task = None
-    for index in waiting:
-        worker.give(index, files[index])
-        return
+def sweep(
+    folder: Path,
+    settings: SweepSettings,
+    *,
+    out: Path | None = None,
+    resume: bool = False,
+    progress: bool | None = None,
+) -> list[dict[str, Any]]:
+    """Run over all ``*.xml`` files of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    settings : SweepSettings
+    out : Path, optional
+        Where the rows are stored as they come; by default nowhere.
+    resume : bool
+        Go on with what is stored there; otherwise that is forgotten.
+    progress : bool, optional
+        Whether it is told how far it is.
+
+    Returns
+    -------
+    list of dict
+        Rows with the keys :data:`repair.study.rows.COLUMNS`, in the order of the files.
+
+    Raises
+    ------
+    RepairError
+        If the folder has no scenario files, or the settings ask for what there is not: before any work.
+    """
+    tasks = tasks_of(replace(sweep_study(folder, settings), results=out is not None))
+    with tempfile.TemporaryDirectory(prefix="repair-") as aside, ExitStack() as opened:
+        store = opened.enter_context(Store(Path(aside) if out is None else out, fresh=not resume))
+        words = [*settings.backends, "--reference", *settings.references]
+        store.tell(command=f"repair sweep {folder.name} --backend {' '.join(words)}")
+        run_study(tasks, store, LocalLanes(settings.jobs), progress=progress)
+        return [as_sweep_row(row) for row in store.rows()]

@@ -1,38 +1,204 @@
-"""The rows of a sweep as files."""
+"""The rows of a study in one SQLite file: each written the moment it is there, none of them twice."""
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from repair.study.rows import COLUMNS, SweepSettings
+from repair.errors import OutputError, RepairError, in_words
+from repair.study.plan import Task, package_version
+from repair.study.rows import STUDY_COLUMNS, type_of
 
-__all__ = ["write_sweep"]
+__all__ = ["STORE_FILE", "Store"]
+
+STORE_FILE = "study.sqlite"
+_SCHEMA = "1"
+_SQL = {bool: "INTEGER", int: "INTEGER", float: "REAL", str: "TEXT"}
+_PATIENCE = 30.0  # how long to wait for another process that writes [s]
 
 
-def write_sweep(
-    rows: list[dict[str, Any]], folder: Path, settings: SweepSettings, source: Path
-) -> list[Path]:
-    """Write ``sweep.csv`` and ``sweep.json`` (rows, settings, checksums of the files)."""
-    from repair.io.files import write_files
-    from repair.io.result_json import to_json
+def _column(name: str) -> str:
+    """A column as it is declared: SQLite itself would take anything for anything."""
+    kind = type_of(name)
+    held = {bool: f"{name} IN (0, 1)", str: f"typeof({name}) = 'text'"}.get(
+        kind, f"typeof({name}) = '{_SQL[kind].lower()}'"
+    )
+    return f"{name} {_SQL[kind]} CHECK ({name} IS NULL OR {held})"
 
-    table = io.StringIO()
-    writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    content = {
-        "settings": {
-            "backends": list(settings.backends),
-            "references": list(settings.references),
-            "preset": settings.preset,
-            "overrides": list(settings.overrides),
-        },
-        "files": {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in sorted(source.glob("*.xml"))},
-        "rows": rows,
-    }
-    rows_text = table.getvalue().encode("utf-8", "backslashreplace")
-    return write_files(folder, {"sweep.csv": rows_text, "sweep.json": to_json(content).encode()})
+
+_TABLES = f"""
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE tasks (
+    position INTEGER PRIMARY KEY, key TEXT NOT NULL, file TEXT NOT NULL, path TEXT NOT NULL,
+    sha256 TEXT NOT NULL, backend TEXT NOT NULL, reference TEXT NOT NULL, variation TEXT NOT NULL,
+    varied TEXT NOT NULL
+);
+CREATE TABLE rows (
+    key TEXT PRIMARY KEY, sha256 TEXT NOT NULL, config_sha256 TEXT NOT NULL, version TEXT NOT NULL,
+    {", ".join(_column(name) for name in STUDY_COLUMNS)}, result BLOB
+);
+"""
+
+
+class Store:
+    """The database of a study.
+
+    Parameters
+    ----------
+    folder : Path
+        It is made, and the file ``study.sqlite`` in it, if need be.
+    fresh : bool
+        Begin anew: what is there is forgotten.
+    readonly : bool
+        Something has to be there, and stays as it is.
+
+    Raises
+    ------
+    RepairError
+        If it cannot be made or read, or was made by a version with other columns.
+    """
+
+    def __init__(self, folder: Path, *, fresh: bool = False, readonly: bool = False) -> None:
+        self.path = folder / STORE_FILE
+        try:
+            if not readonly:
+                folder.mkdir(parents=True, exist_ok=True)
+                if fresh:
+                    for end in ("", "-wal", "-shm"):
+                        self.path.with_name(self.path.name + end).unlink(missing_ok=True)
+            elif not self.path.is_file():
+                raise RepairError(
+                    f"{folder} holds no {STORE_FILE}; `repair study` and `repair sweep` write one"
+                )
+        except OSError as error:
+            raise OutputError(f"the store {self.path} cannot be made: {error.strerror or error}") from error
+        self._open(readonly)
+
+    def _open(self, readonly: bool) -> None:
+        try:
+            # One thread writes; a lane of a cluster answers in threads of its own, and its row is taken here.
+            self.base = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
+            self.base.row_factory = sqlite3.Row
+            if not readonly:
+                self.base.execute("PRAGMA journal_mode=WAL")
+                self.base.execute("PRAGMA synchronous=NORMAL")
+            there = {row[0] for row in self.base.execute("SELECT name FROM sqlite_master WHERE type='table'")}
+            if not there and not readonly:
+                self.base.executescript(f"BEGIN IMMEDIATE; {_TABLES} COMMIT;")
+                self.tell(schema=_SCHEMA)
+                there = {"rows"}
+            columns = {row[1] for row in self.base.execute("PRAGMA table_info(rows)")}
+        except sqlite3.Error as error:
+            raise RepairError(f"the store {self.path} cannot be used: {in_words(error)}") from error
+        if self.about().get("schema") != _SCHEMA or not columns >= set(STUDY_COLUMNS):
+            raise RepairError(
+                f"the store {self.path} was made by a version of this program with other columns; "
+                "begin in another folder"
+            )
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file; what was written is in it."""
+        with suppress(sqlite3.Error):
+            self.base.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        self.base.close()
+
+    def about(self) -> dict[str, str]:
+        """What is told about the study: its text, the command, versions."""
+        try:
+            return {row["name"]: row["value"] for row in self.base.execute("SELECT name, value FROM about")}
+        except sqlite3.Error as error:
+            raise RepairError(f"the store {self.path} cannot be used: {in_words(error)}") from error
+
+    def tell(self, **words: str) -> None:
+        """Note something about the study."""
+        self.base.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", words.items())
+
+    def plan(self, tasks: Iterable[Task]) -> None:
+        """Note what the study is; rows that are no part of it stay, and are not shown."""
+        listed = []
+        for k, t in enumerate(tasks):
+            words = (t.key, t.file, t.path, t.sha256, t.backend, t.reference, t.variation)
+            listed.append((k, *map(_storable, words), json.dumps(dict(t.varied))))
+        with self._whole():
+            self.base.execute("DELETE FROM tasks")
+            self.base.executemany(f"INSERT INTO tasks VALUES ({', '.join('?' * 9)})", listed)
+
+    def done(self) -> set[str]:
+        """The keys of all rows."""
+        return {row["key"] for row in self.base.execute("SELECT key FROM rows")}
+
+    def add(self, task: Task, row: Mapping[str, Any], whole: bytes | None) -> None:
+        """Write a row; it is there when this returns, whatever comes then.
+
+        Raises
+        ------
+        OutputError
+            With the reason of the operating system, or of SQLite.
+        """
+        held = [_storable(row[name]) for name in STUDY_COLUMNS]
+        values = [task.key, task.sha256, task.config_sha256, package_version(), *held, whole]
+        names = ("key", "sha256", "config_sha256", "version", *STUDY_COLUMNS, "result")
+        try:
+            self.base.execute(
+                f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})",
+                values,
+            )
+        except sqlite3.Error as error:
+            raise OutputError(f"a row cannot be written to {self.path}: {in_words(error)}") from error
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """The rows of the study in its order, as far as they are there, with the settings that vary."""
+        named = ", ".join(f"rows.{name}" for name in STUDY_COLUMNS if name != "file")
+        named = f"tasks.file AS file, tasks.varied AS varied, {named}"
+        query = f"SELECT {named} FROM tasks JOIN rows USING (key) ORDER BY position"
+        for found in self.base.execute(query):
+            row: dict[str, Any] = {}
+            for name in STUDY_COLUMNS:
+                value = found[name]
+                row[name] = bool(value) if value is not None and type_of(name) is bool else value
+                if name == "reference":
+                    row.update(json.loads(found["varied"]))
+            yield row
+
+    def whole(self, position: int) -> bytes | None:
+        """The whole result of a task, compressed; None where there is none."""
+        query = "SELECT result FROM tasks JOIN rows USING (key) WHERE position = ?"
+        found = self.base.execute(query, (position,)).fetchone()
+        return None if found is None else found["result"]
+
+    def tasks(self) -> list[dict[str, Any]]:
+        """What the study is: each task with its position, and whether its row is there."""
+        joined = "tasks LEFT JOIN rows USING (key) ORDER BY position"
+        query = f"SELECT tasks.*, rows.key IS NOT NULL AS done FROM {joined}"
+        return [dict(row) | {"done": bool(row["done"])} for row in self.base.execute(query)]
+
+    def _whole(self) -> _Transaction:
+        return _Transaction(self.base)
+
+
+def _storable(value: Any) -> Any:
+    """What is left of a file name that is no UTF-8 is escaped."""
+    return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
+
+
+class _Transaction:
+    """All of it, or nothing."""
+
+    def __init__(self, base: sqlite3.Connection) -> None:
+        self.base = base
+
+    def __enter__(self) -> None:
+        self.base.execute("BEGIN IMMEDIATE")
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        self.base.execute("COMMIT" if kind is None else "ROLLBACK")

@@ -1,98 +1,233 @@
-"""One file through every backend and reference."""
+"""One row: a scenario by a reference, a backend and a configuration; what rows share is made once."""
 
 from __future__ import annotations
 
+import gc
+import json
 import tempfile
 import time
+import zlib
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from repair.config import load_config
 from repair.errors import BackendError, RepairError
-from repair.study.rows import COLUMNS, SweepSettings, combinations, failed_row, one_line
+from repair.study.plan import Study, Task, tasks_of
+from repair.study.rows import (
+    STUDY_COLUMNS,
+    SweepSettings,
+    as_sweep_row,
+    combinations,
+    failed_row,
+    one_line,
+    strict,
+)
+
+if TYPE_CHECKING:
+    from repair.baselines.evasive.times import EvasiveResult
+    from repair.preparation import Prepared
+    from repair.scene.scene import Scene
+
+__all__ = ["Kept", "packed", "row_of", "run_file", "unpacked"]
+
+_PREPARED = 4  # preparations of one scenario that are kept: of as many references, or other settings
+
+
+@dataclass
+class Kept:
+    """What rows of one scenario have in common, kept until a row of another scenario is asked for.
+
+    The time that each part took is told with every row that uses it.
+    """
+
+    file: tuple[str, str] | None = None
+    scenes: dict[str, tuple[Scene, float]] = field(default_factory=dict)
+    prepared: dict[str, tuple[Prepared, float]] = field(default_factory=dict)
+    evaded: dict[tuple[str, str], tuple[EvasiveResult, float]] = field(default_factory=dict)
+
+    def turn_to(self, task: Task) -> None:
+        """Forget another scenario."""
+        if self.file != (task.path, task.sha256):
+            for each in (self.scenes, self.prepared, self.evaded):
+                each.clear()
+            if self.file is not None:
+                gc.unfreeze()
+                gc.collect()
+            self.file = (task.path, task.sha256)
+
+    def scene(self, task: Task) -> tuple[Scene, float]:
+        """The scene as the configuration reads it, and how long that took [s]."""
+        from repair.scene.commonroad import load_scene
+
+        key = _text(task.config.to_dict()["scene"])
+        if key not in self.scenes:
+            begin = time.perf_counter()
+            # Reading makes hundreds of thousands of small objects that all stay: to look for garbage among
+            # them, again and again, takes longer than anything else with them.
+            collects = gc.isenabled()
+            gc.disable()
+            try:
+                self.scenes[key] = load_scene(task.path, task.config), time.perf_counter() - begin
+            finally:
+                if collects:
+                    gc.freeze()
+                    gc.enable()
+        return self.scenes[key]
+
+    def situation(self, task: Task) -> tuple[Prepared, float]:
+        """What is searched, made for this row's configuration, and how long the preparation took [s]."""
+        from repair.preparation import again_for, prepare, what_matters
+
+        key = _text(what_matters(task.config))
+        if key in self.prepared:
+            like, spent = self.prepared[key]
+            return again_for(like, task.config), spent
+        scene, _ = self.scene(task)
+        begin = time.perf_counter()
+        made = prepare(scene, task.config)
+        spent = time.perf_counter() - begin
+        while len(self.prepared) >= _PREPARED:
+            self.prepared.pop(next(iter(self.prepared)))
+        self.prepared[key] = made, spent
+        return again_for(made, task.config), spent
+
+    def evasive(self, task: Task, prepared: Prepared) -> tuple[EvasiveResult, float]:
+        """The fixed evasive manoeuvres, and how long they took [s]."""
+        from repair.baselines.evasive.times import evasive_ttr
+
+        values = task.config.to_dict()
+        key = _text(values["evasive"]), _text(values["reference"]) + _text(_prepared_by(task))
+        if key not in self.evaded:
+            begin = time.perf_counter()
+            self.evaded[key] = evasive_ttr(prepared, task.config.evasive), time.perf_counter() - begin
+        return self.evaded[key]
+
+
+def _prepared_by(task: Task) -> dict[str, Any]:
+    from repair.preparation import what_matters
+
+    return what_matters(task.config)
+
+
+def _text(values: Any) -> str:
+    return json.dumps(values, sort_keys=True, default=str)
+
+
+def row_of(task: Task, kept: Kept) -> tuple[dict[str, Any], bytes | None]:
+    """The row of a task, whatever happens, and the whole result, compressed.
+
+    Anything that is raised is a row that says so.
+    """
+    begin = time.perf_counter()
+    kept.turn_to(task)
+    whole: bytes | None = None
+    try:
+        row, whole = _row(task, kept)
+    except RepairError as error:
+        # What a backend's own failure is reported as is no fault of the input.
+        broken = isinstance(error, BackendError) and isinstance(error.__cause__, Exception)
+        row = failed_row(task.file, task.backend, task.reference, "crash" if broken else "input_error",
+                         one_line(error))  # fmt: skip
+    except MemoryError:
+        row = failed_row(task.file, task.backend, task.reference, "memory", "there was no memory left")
+    except Exception as error:
+        detail = f"{type(error).__name__}: {one_line(error)}"
+        row = failed_row(task.file, task.backend, task.reference, "crash", detail)
+    row.update(variation=task.variation, row_time_s=round(time.perf_counter() - begin, 4))
+    return strict(row), whole
 
 
 def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
-    """All rows of one file; anything that goes wrong in it is a row."""
-    from repair.scene.commonroad import load_scene
-
-    begin = time.perf_counter()
+    """All rows of one file as a sweep has them, made here; anything that goes wrong in it is a row."""
+    study = Study(
+        (path,), tuple(settings.backends), tuple(settings.references), preset=settings.preset,
+        settings=settings.overrides, official=settings.official, certify=settings.certify, results=False,
+    )  # fmt: skip
     try:
-        config = load_config(settings.preset, overrides=settings.overrides)
-        scene = load_scene(path, config)
+        tasks = tasks_of(study)
     except RepairError as error:
         return [
-            failed_row(path.name, b, r, "input_error", one_line(error)) for b, r in combinations(settings)
+            as_sweep_row(failed_row(path.name, b, r, "input_error", one_line(error)))
+            for b, r in combinations(settings)
         ]
-    loaded = time.perf_counter() - begin
-    rows = []
-    for backend, reference in combinations(settings):
-        try:
-            rows.append(_row(path.name, scene, backend, reference, settings, loaded))
-        except RepairError as error:
-            # What a backend's own failure is reported as is no fault of the input.
-            broken = isinstance(error, BackendError) and isinstance(error.__cause__, Exception)
-            status = "crash" if broken else "input_error"
-            rows.append(failed_row(path.name, backend, reference, status, one_line(error)))
-        except Exception as error:
-            detail = f"{type(error).__name__}: {one_line(error)}"
-            rows.append(failed_row(path.name, backend, reference, "crash", detail))
-    return rows
+    kept = Kept()
+    return [as_sweep_row(row_of(task, kept)[0]) for task in tasks]
 
 
-def _row(
-    file: str, scene: Any, backend: str, reference: str, settings: SweepSettings, loaded: float
-) -> dict[str, Any]:
-    from repair.api import search
-    from repair.baselines.evasive.times import evasive_ttr
-    from repair.preparation import prepare
+def packed(record: dict[str, Any], drawing: dict[str, Any] | None) -> bytes:
+    """A whole result, compressed: what ``result.json`` and ``drawing.json`` hold."""
+    text = json.dumps({"record": record, "drawing": drawing}, allow_nan=False, separators=(",", ":"))
+    return zlib.compress(text.encode("utf-8", "backslashreplace"), 6)
+
+
+def unpacked(whole: bytes) -> dict[str, Any]:
+    """``record`` and ``drawing`` of a stored result."""
+    content: dict[str, Any] = json.loads(zlib.decompress(whole))
+    return content
+
+
+def _row(task: Task, kept: Kept) -> tuple[dict[str, Any], bytes | None]:
+    from repair.api import make, search
+    from repair.io.drawing_json import drawing_to_dict
     from repair.search.result import SearchStatus
-    from repair.solvers.registry import make_backend
 
-    overrides = [*settings.overrides, f"reference.source={reference}"]
-    config = load_config(settings.preset, overrides=overrides, backend=backend)
-    begin = time.perf_counter()
-    prepared = prepare(scene, config)
-    prepared_in = time.perf_counter() - begin
-    result = search(prepared, make_backend(backend, config))
+    prepared, prepared_in = kept.situation(task)
+    _, loaded_in = kept.scene(task)
+    result = search(prepared, make(task.config))
     content = result.to_dict()
-    evasive = evasive_ttr(prepared, config.evasive)
+    evasive, evaded_in = kept.evasive(task, prepared)
     best = result.search.best
     failing = result.search.probes[0] if best is None and result.search.probes else None
-    row: dict[str, Any] = dict.fromkeys(COLUMNS)
-    row.update({key: content[key] for key in COLUMNS if key in content})
+    row: dict[str, Any] = dict.fromkeys(STUDY_COLUMNS)
+    row.update({key: content[key] for key in STUDY_COLUMNS if key in content})
+    conflict, spent = content["conflict"], result.phases
     row.update(
-        file=file,
-        reference=reference,
+        file=task.file,
+        backend=task.backend,
+        reference=task.reference,
         detail=_why(failing) if failing is not None else "",
-        conflict=content["conflict"]["kind"],
-        margin_only=content["conflict"]["margin_only"],
-        obstacle_id=content["conflict"]["obstacle_id"],
-        from_behind=content["conflict"]["from_behind"],
-        ttb_s=_text(evasive.ttb),
-        ttr_s=_text(evasive.ttr),
+        conflict=conflict["kind"],
+        **{
+            name: conflict[name]
+            for name in ("margin_only", "obstacle_id", "contact_obstacle_id", "from_behind")
+        },
+        **_evasive(evasive),
         largest_residual=max(best.solve.residuals.values(), default=None) if best is not None else None,
         probes=" ".join(
             f"{p.t_rep:g}:{'+' if p.feasible else '-'.join(('', *p.verdict.reasons))}"
             for p in result.search.probes
         ),
-        load_time_s=round(loaded, 4),
+        load_time_s=round(loaded_in, 4),
         prepare_time_s=round(prepared_in, 4),
-        **{f"{name}_time_s": round(result.phases[name], 5) for name in ("search", "solve", "check")},
+        evasive_time_s=round(evaded_in, 5),
+        other_time_s=round(max(spent["search"] - spent["build"] - spent["solve"] - spent["check"], 0.0), 5),
+        **{f"{name}_time_s": round(spent[name], 5) for name in ("search", "build", "solve", "check")},
     )
     row.update(_ending(content["terminal"]))
     if (onward := content["onward"]) is not None:
         row.update(onward=onward["kind"], onward_reached=onward["reached"], onward_detail=onward["sentence"])
-    if settings.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
+    if task.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row.update(_official(result))
-    if settings.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
+    if task.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row["certificate"] = _certificate(result)
-    return row
+    if not task.results:
+        return row, None
+    drawing = result.outcome.drawing
+    return row, packed(content, None if drawing is None else drawing_to_dict(drawing))
 
 
-def _text(value: float) -> float | str:
-    """Numbers as they are; CriMe's infinities as words, because JSON has none."""
-    return "inf" if value == float("inf") else "-inf" if value == -float("inf") else round(value, 6)
+def _evasive(found: EvasiveResult) -> dict[str, Any]:
+    """TTB and TTR with why they have their value; no figure where it is infinite."""
+    from repair.baselines.evasive.maneuvers import EvasiveManeuver
+
+    brake = found.status[EvasiveManeuver.BRAKE]
+    best = brake if found.maneuver is None else found.status[found.maneuver]
+    finite = {"ttb": found.ttb, "ttr": found.ttr}
+    return {
+        **{f"{k}_s": round(v, 6) if abs(v) != float("inf") else None for k, v in finite.items()},
+        "ttb_status": brake.value,
+        "ttr_status": best.value,
+    }
 
 
 def _why(probe: Any) -> str:
