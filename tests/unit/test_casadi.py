@@ -17,7 +17,7 @@ from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, Maneuver, Side
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
 from repair.solvers.casadi.backend import CasadiBackend
-from repair.solvers.casadi.buffered import Buffered
+from repair.solvers.casadi.buffered import Buffered, KeptBySize
 from repair.solvers.casadi.instance import lay_out, limit_values, plane_acceleration
 from repair.solvers.casadi.model import Model, Solution, build_model
 from repair.solvers.casadi.residuals import residuals_of
@@ -267,6 +267,22 @@ def test_the_model_is_built_once():
     after = build_model.cache_info()
     assert after.misses == before.misses
     assert again.status is SolveStatus.SOLVED
+
+
+def test_models_are_kept_as_far_as_there_is_room():
+    structure = CasadiBackend().structure(problems.static_block())
+    kept = KeptBySize(lambda key: object(), lambda key: key.megabytes, 3.5 * structure.megabytes)
+    four = [replace(structure, tolerance=10.0**-k) for k in range(4, 8)]
+    made = [kept(key) for key in four[:3]]
+    assert [kept(key) for key in four[:3]] == made
+    kept(four[3])  # and the first one goes
+    assert kept.cache_info().currsize == 3
+    assert kept(four[2]) is made[2]
+    assert kept(four[0]) is not made[0]
+    large = replace(structure, n=200)
+    assert kept(large) is kept(large)
+    assert kept.cache_info().currsize == 1
+    assert build_model.megabytes <= build_model.cache_info().maxsize
 
 
 def test_the_nlp_is_made_when_it_is_first_solved(monkeypatch):

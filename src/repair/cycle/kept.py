@@ -99,8 +99,7 @@ def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[fl
     apart = np.abs(here.position - there.position).max()
     if apart > _PLACE_OFF or np.abs(here.velocity - there.velocity).max() > _SPEED_OFF:
         return None
-    problems = prepared.source.at(t_rep)
-    if not problems:
-        return None
-    verdict: Verdict = prepared.judge.check(problems[0], curve)
+    if t_rep > prepared.t_end - prepared.scene.dt + INSTANT:
+        return None  # nothing would be left of it
+    verdict: Verdict = prepared.judge.check(prepared.source.plain(t_rep), curve)
     return (t_rep, curve) if verdict.ok else None

@@ -162,7 +162,7 @@ class Repairer:
         scene = self._now(step, state, traffic)
         given = given_reference(reference, scene)
         scene, checker = self._frame(scene, given, rebuilt)
-        prepared = laid_out(scene, self.config, given, Phases(), like=checker)
+        prepared = laid_out(scene, self.config, given, Phases(), like=checker, within_reach=True)
         self._checker = prepared.checker
         kept = None if self._kept is None else verified_again(self._kept, prepared, now)
         settings = self.config.search

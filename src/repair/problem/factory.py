@@ -28,9 +28,15 @@ from repair.world.road import RoadBoundary
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["ProblemFactory", "Unguided"]
+__all__ = ["ProblemFactory", "Unguided", "room_of"]
 # Where the lateral room is looked up, from the hindmost to the foremost place within reach.
 _SHARES = frozen(np.linspace(0.0, 1.0, 50))
+
+
+def room_of(scene: Scene, settings: RepairConfig) -> LateralBounds:
+    """Lateral room of the reference point in a scene, as ``repair.lateral`` says."""
+    wide = {"lane": scene.lane, "same_direction": scene.same_direction, "road": scene.road}
+    return wide.get(settings.lateral, scene.lane)
 
 
 @dataclass(frozen=True)
@@ -65,8 +71,7 @@ class ProblemFactory:
     @cached_property
     def bounds(self) -> LateralBounds:
         """Lateral room of the reference point, as ``repair.lateral`` says."""
-        wide = {"lane": self.scene.lane, "same_direction": self.scene.same_direction, "road": self.scene.road}
-        return wide.get(self.settings.lateral, self.scene.lane)
+        return room_of(self.scene, self.settings)
 
     @cached_property
     def _shapes(self) -> Shapes:

@@ -9,7 +9,7 @@ the ego may be treated as a point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,13 +24,27 @@ if TYPE_CHECKING:
     from repair.scene.frame import FrenetFrame
     from repair.scene.traffic.obstacle import Obstacle
 
-__all__ = ["build_occupancy", "first_entry", "near", "relevant", "shrink_to_start"]
+__all__ = ["Within", "build_occupancy", "first_entry", "near", "relevant", "shrink_to_start"]
 
 _OUTSIDE = 1e-6  # a reduced box ends this far from where the reference was [m]
+_STRIDE = 2.0  # of the places of a path that obstacles are held against [m]
+
+
+class Within(NamedTuple):
+    """The part of the road that matters: arc lengths from ``low`` to ``high``, and how far aside [m]."""
+
+    low: float
+    high: float
+    aside: float
 
 
 def build_occupancy(
-    obstacles: Sequence[Obstacle], frame: FrenetFrame, dt: float, s_offset: float, l_offset: float
+    obstacles: Sequence[Obstacle],
+    frame: FrenetFrame,
+    dt: float,
+    s_offset: float,
+    l_offset: float,
+    within: Within | None = None,
 ) -> tuple[Occupancy, tuple[str, ...]]:
     """Project all obstacles and inflate them.
 
@@ -43,6 +57,8 @@ def build_occupancy(
         Scenario step [s].
     s_offset, l_offset : float
         Inflation on either side along s and l [m].
+    within : Within, optional
+        Who is nowhere near it is not projected, and has a row of NaN.
 
     Returns
     -------
@@ -53,44 +69,87 @@ def build_occupancy(
         Which obstacles leave the frame's domain of projection, and when.
     """
     steps = len(obstacles[0].vertices) if obstacles else 1
-    passes = _project_all(obstacles, frame) if obstacles else [[]]
-    corners: list[tuple[Array, Array]] = []
-    which: list[int] = []
+    reach = 0.0 if within is None else within.aside + s_offset + l_offset
+    near = [True] * len(obstacles) if within is None else _near_by(obstacles, frame, within, reach)
+    chosen = [k for k, one in enumerate(near) if one]
+    looked = [obstacles[k] for k in chosen]
+    passes = _project_all(looked, frame) if looked else [[]]
+    lower, upper = np.full((2, len(obstacles), steps, 2), np.nan)
+    more: list[tuple[Array, Array]] = []
+    which = list(range(len(obstacles)))
     notes: list[str] = []
     inflate = np.array([s_offset, l_offset])
+    present = [np.asarray(np.isfinite(obstacle.vertices).all(axis=(1, 2))) for obstacle in looked]
+    seen = [np.zeros(steps, dtype=np.bool_) for _ in looked]
     for turn, projected in enumerate(passes):
-        for k, points in enumerate(projected):
-            low, high = _box(points, obstacles[k], inflate)
-            if turn == 0 or np.isfinite(low).any():
-                corners.append((low, high))
-                which.append(k)
-    for k, obstacle in enumerate(obstacles):
-        present = np.asarray(np.isfinite(obstacle.vertices).all(axis=(1, 2)))
-        whole = [np.isfinite(projected[k]).all(axis=(1, 2)) for projected in passes]
-        hidden = present & ~np.logical_or.reduce(whole)
+        for j, points in enumerate(projected):
+            low, high, whole = _box(points, present[j], inflate)
+            seen[j] |= whole
+            if turn == 0:
+                lower[chosen[j]], upper[chosen[j]] = low, high
+            elif np.isfinite(low).any():
+                more.append((low, high))
+                which.append(chosen[j])
+    for j, obstacle in enumerate(looked):
+        hidden = present[j] & ~seen[j]
         if hidden.any():
             first = float(np.flatnonzero(hidden)[0] * dt)
             notes.append(
                 f"obstacle {obstacle.id} is (partly) outside of the frame's domain from t = {first:g} s; "
                 "only the check of the true shapes sees it there"
             )
+    if more:
+        lower = np.concatenate([lower, [low for low, _ in more]])
+        upper = np.concatenate([upper, [high for _, high in more]])
     ids = names(obstacles[k].id for k in which)
     static = np.array([obstacles[k].role in ("static", "environment") for k in which], dtype=np.bool_)
     t = frozen(np.arange(steps) * dt)
-    lower, upper = np.array(corners).reshape(-1, 2, steps, 2).transpose(1, 0, 2, 3)
     return Occupancy(t, ids, frozen(lower), frozen(upper), static), tuple(notes)
 
 
-def _box(points: Array, obstacle: Obstacle, inflate: Array) -> tuple[Array, Array]:
-    """Inflated corners (T, 2) around what is known of an outline (T, V, 2); NaN where that is nothing."""
-    known = np.asarray(np.isfinite(points).all(axis=-1))
-    seen = known.any(axis=1) & np.isfinite(obstacle.vertices).all(axis=(1, 2))
+def _near_by(obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, reach: float) -> list[bool]:
+    """Whether each obstacle is ever near a part of the path; other shapes than rectangles always count."""
+    kept = [obstacle.rectangles is None for obstacle in obstacles]
+    rows = [k for k, one in enumerate(kept) if not one]
+    if not rows:
+        return kept
+    tables = np.array([obstacles[k].rectangles for k in rows])  # (N, T, 5)
+    centre = tables[..., 0] + 1j * tables[..., 1]
+    away = reach + np.hypot(tables[..., 3], tables[..., 4])
+    first, last = (np.clip(s, 0.0, frame.length) for s in (within.low, within.high))
+    at = np.linspace(first, last, max(int((last - first) / _STRIDE) + 1, 2))
+    path = np.ascontiguousarray(frame.position(at)).view(np.complex128)[:, 0]
+    away += at[1] - at[0] + max(first - within.low, 0.0) + max(within.high - last, 0.0)
+    # The circle around the part settles most.
+    middle = 0.5 * (path[0] + path[-1])
+    radius = float(np.abs(path - middle).max())
+    i, j = np.nonzero(np.abs(centre - middle) <= radius + away)
+    close = np.abs(centre[i, j][:, None] - path).min(axis=1, initial=np.inf) <= away[i, j]
+    for k in np.unique(i[close]).tolist():
+        kept[rows[k]] = True
+    return kept
+
+
+def _box(
+    points: Array, present: npt.NDArray[np.bool_], inflate: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Inflated corners (T, 2) around what is known of an outline (T, V, 2), and where it is whole.
+
+    NaN where nothing is known.
+    """
+    known = np.isfinite(points[..., 0]) & np.isfinite(points[..., 1])
+    whole = np.asarray(known.all(axis=1))
     lower, upper = np.full((2, len(points), 2), np.nan)
-    if seen.any():
-        masked = np.where(known[seen][..., None], points[seen], np.nan)
-        lower[seen] = np.nanmin(masked, axis=1) - inflate
-        upper[seen] = np.nanmax(masked, axis=1) + inflate
-    return lower, upper
+    clear = whole & present
+    if clear.any():
+        lower[clear] = points[clear].min(axis=1) - inflate
+        upper[clear] = points[clear].max(axis=1) + inflate
+    part = known.any(axis=1) & present & ~whole
+    if part.any():
+        masked = np.where(known[part][..., None], points[part], np.nan)
+        lower[part] = np.nanmin(masked, axis=1) - inflate
+        upper[part] = np.nanmax(masked, axis=1) + inflate
+    return lower, upper, whole
 
 
 def _project_all(obstacles: Sequence[Obstacle], frame: FrenetFrame) -> list[list[Array]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from repair.scene.traffic.given import given_scenario, known_rows, speeds_along,
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.scene.traffic.prediction import Prediction, name_of, size_of
-from repair.scene.traffic.rows import rigid_outline
+from repair.scene.traffic.rows import outline_of
 
 __all__ = ["given_obstacles"]
 
@@ -65,8 +66,7 @@ def given_obstacles(
     tables = [(name, prediction, _table_of(prediction)) for name, prediction in chosen]
     longest = max((len(table) for _, _, table in tables), default=0) - 1
     n_steps = min(longest, steps_max) if longest > 0 else steps_max
-    made = tuple(_of_table(name, one, table, n_steps, float(old.dt)) for name, one, table in tables)
-    return made, n_steps, notes
+    return _of_tables(tables, n_steps, float(old.dt)), n_steps, notes
 
 
 def _table_of(prediction: Prediction) -> Array:
@@ -81,19 +81,61 @@ def _table_of(prediction: Prediction) -> Array:
     return table[: begin + len(rows)]
 
 
-def _of_table(name: int, prediction: Prediction, table: Array, n_steps: int, dt: float) -> Obstacle:
-    """An obstacle of poses (T, 3)."""
-    rectangles = np.full((n_steps + 1, 5), np.nan)
-    states = np.full((n_steps + 1, 4), np.nan)
-    count = min(len(table), n_steps + 1)
-    there = np.flatnonzero(np.isfinite(table[:, 0]))
-    speed = np.full(len(table), np.nan)
-    speed[there] = speeds_along(table[there], dt)
-    states[:count, :3], states[:count, 3] = table[:count], speed[:count]
-    rectangles[:count, :3] = table[:count]
-    rectangles[np.isfinite(rectangles[:, 0]), 3:] = 0.5 * np.array(size_of(prediction))
-    vertices = rigid_outline(rectangles)
-    assert vertices is not None
-    return Obstacle(
-        name, prediction.kind, "dynamic", frozen(vertices), frozen(rectangles), None, (), frozen(states)
+def _of_tables(tables: list[tuple[int, Prediction, Array]], n_steps: int, dt: float) -> tuple[Obstacle, ...]:
+    """Obstacles of poses (T, 3) each, all at once: there are dozens of them every cycle."""
+    longest = max((len(table) for _, _, table in tables), default=0)
+    poses = np.full((len(tables), max(longest, n_steps + 1), 3), np.nan)
+    for row, (_, _, table) in zip(poses, tables, strict=True):
+        row[: len(table)] = table
+    speed = _speeds(poses[:, :longest], dt)
+    poses = poses[:, : n_steps + 1]
+    states, rectangles = np.full((2, len(tables), n_steps + 1, 5), np.nan)
+    states[..., :3] = rectangles[..., :3] = poses
+    states[:, : speed.shape[1], 3] = speed[:, : n_steps + 1]
+    there = np.isfinite(poses[..., 0])
+    for k, (_, prediction, _) in enumerate(tables):
+        rectangles[k, there[k], 3:] = 0.5 * np.array(size_of(prediction))
+    outlines = [_outline(*size_of(prediction)) for _, prediction, _ in tables]
+    for made in (states, rectangles):
+        made.setflags(write=False)
+    vertices = _placed(outlines, poses)
+    return tuple(
+        Obstacle(name, one.kind, "dynamic", vertices[k], rectangles[k], None, (), states[k, :, :4])
+        for k, (name, one, _) in enumerate(tables)
     )
+
+
+def _speeds(poses: Array, dt: float) -> Array:
+    """Speeds (N, T) along the headings of poses (N, T, 3) [m/s]; NaN where there is no pose."""
+    made = np.full(poses.shape[:2], np.nan)
+    there = np.isfinite(poses[..., 0])
+    whole = there.all(axis=1)
+    if whole.any() and poses.shape[1] > 1:
+        moved = np.gradient(poses[whole, :, :2], dt, axis=1)
+        yaw = poses[whole, :, 2]
+        made[whole] = moved[..., 0] * np.cos(yaw) + moved[..., 1] * np.sin(yaw)
+    for k in np.flatnonzero(~whole if poses.shape[1] > 1 else whole | ~whole).tolist():
+        made[k, there[k]] = speeds_along(poses[k, there[k]], dt)
+    return made
+
+
+@lru_cache(maxsize=256)
+def _outline(length: float, width: float) -> Array:
+    """Points (V, 2) around a rectangle, seen from its middle."""
+    return frozen(outline_of(0.5 * length, 0.5 * width))
+
+
+def _placed(outlines: list[Array], poses: Array) -> list[Array]:
+    """Outlines (V, 2) where the poses (N, T, 3) have them, (T, V, 2) each."""
+    cos, sin = np.cos(poses[..., 2, None]), np.sin(poses[..., 2, None])
+    made: list[Array] = [np.empty(0)] * len(outlines)
+    for size in {len(outline) for outline in outlines}:
+        rows = [k for k, outline in enumerate(outlines) if len(outline) == size]
+        x, y = np.array([outlines[k] for k in rows]).transpose(2, 0, 1)[:, :, None]
+        placed = np.empty((len(rows), poses.shape[1], size, 2))
+        placed[..., 0] = cos[rows] * x - sin[rows] * y + poses[rows, :, 0, None]
+        placed[..., 1] = sin[rows] * x + cos[rows] * y + poses[rows, :, 1, None]
+        placed.setflags(write=False)
+        for k, one in zip(rows, placed, strict=True):
+            made[k] = one
+    return made

@@ -12,9 +12,15 @@ from repair.errors import ScenarioError
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.shapes import FAR, Placed, polygons_of, subdivided
 
-__all__ = ["continued_from", "obstacle_of_rows", "repeated", "require_sane", "rigid_outline"]
+__all__ = ["continued_from", "obstacle_of_rows", "outline_of", "repeated", "require_sane", "rigid_outline"]
 
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
+
+
+def outline_of(half_length: float, half_width: float) -> Array:
+    """Outline (V, 2) of a rectangle, seen from its middle."""
+    corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    return subdivided(corners * (half_length, half_width))
 
 
 def rigid_outline(rectangles: Array) -> Array | None:
@@ -22,7 +28,7 @@ def rigid_outline(rectangles: Array) -> Array | None:
     half = rectangles[np.isfinite(rectangles[:, 0]), 3:]
     if np.ptp(half, axis=0).any():
         return None
-    local = subdivided(np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half[0])
+    local = outline_of(*half[0])
     c, s = np.cos(rectangles[:, 2, None]), np.sin(rectangles[:, 2, None])
     x = c * local[:, 0] - s * local[:, 1] + rectangles[:, 0, None]
     y = s * local[:, 0] + c * local[:, 1] + rectangles[:, 1, None]

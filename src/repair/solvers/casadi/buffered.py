@@ -1,9 +1,12 @@
-"""CasADi functions that read and write NumPy arrays, a watch that stops a solver in time, and its errors."""
+"""CasADi functions on NumPy arrays, how many are kept, a watch that stops a solver in time, and errors."""
 
 from __future__ import annotations
 
+import threading
 import time
-from typing import Any
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,12 +16,73 @@ from repair.errors import BackendError
 __all__ = [
     "Buffered",
     "Deadline",
+    "KeptBySize",
     "deadline_callback",
     "last_line",
     "quadratic_program",
     "sparse",
     "unavailable",
 ]
+
+
+Key = TypeVar("Key", bound=Hashable)
+Made = TypeVar("Made")
+
+
+class _Info(NamedTuple):
+    hits: int
+    misses: int
+    maxsize: float
+    currsize: int
+
+
+class KeptBySize(Generic[Key, Made]):
+    """Makes a thing for a key and keeps it; the ones not used for longest go when all take too much memory.
+
+    Parameters
+    ----------
+    make : callable
+    size : callable
+        About how much memory a key's thing takes [MB].
+    most : float
+        How much all of them may take [MB]; the last one is kept however large it is.
+    """
+
+    def __init__(self, make: Callable[[Key], Made], size: Callable[[Key], float], most: float) -> None:
+        self._make, self._size, self._most = make, size, most
+        self._kept: OrderedDict[Key, Made] = OrderedDict()
+        self._lock = threading.Lock()
+        self._hits = self._misses = 0
+
+    def __call__(self, key: Key) -> Made:
+        """What was made for a key, made now if it is not there."""
+        with self._lock:
+            if key in self._kept:
+                self._hits += 1
+                self._kept.move_to_end(key)
+                return self._kept[key]
+            self._misses += 1
+        made = self._make(key)  # two threads may make the same thing; the first one is kept
+        with self._lock:
+            made = self._kept.setdefault(key, made)
+            while len(self._kept) > 1 and self.megabytes > self._most:
+                self._kept.popitem(last=False)
+        return made
+
+    @property
+    def megabytes(self) -> float:
+        """About how much memory is in use [MB]."""
+        return sum(self._size(key) for key in self._kept)
+
+    def cache_info(self) -> _Info:
+        """As that of :func:`functools.lru_cache`; the largest size in MB, the current one in things."""
+        return _Info(self._hits, self._misses, self._most, len(self._kept))
+
+    def cache_clear(self) -> None:
+        """Forget all of them."""
+        with self._lock:
+            self._kept.clear()
+            self._hits = self._misses = 0
 
 
 class Buffered:

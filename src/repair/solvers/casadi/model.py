@@ -3,7 +3,7 @@
 Everything that is linear in the control points (derivative limits, obstacles, room, direction of
 travel) is a constant matrix with bounds that change from problem to problem
 (:mod:`repair.solvers.casadi.rows`); what is not is :mod:`repair.solvers.casadi.nlp`. A :class:`Model`
-therefore depends on sizes and settings alone and is kept for the life of the process.
+therefore depends on sizes and settings alone and is kept, as many as there is room for.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from repair.deadline import Estimate, held, in_time
 from repair.solvers.casadi.buffered import (
     Buffered,
     Deadline,
+    KeptBySize,
     last_line,
     quadratic_program,
     sparse,
@@ -33,6 +34,7 @@ __all__ = ["TOLERANCE", "Model", "Solution", "build_model", "status_of"]
 
 TOLERANCE = 1e-6  #: largest violation of a curve that is called solved
 _DAQP_INFEASIBLE = -1
+_KEPT = 128.0  # of models, their NLPs included [MB]
 # What making a model takes [s], by entry of its matrix, and an NLP, by sample; CasADi cannot be interrupted.
 # Before any was made they are those of a slow machine.
 _LAID_OUT = Estimate(5e-7)
@@ -259,16 +261,9 @@ class Model(Layout):
         return Solution(x, str(stats["return_status"]), int(stats.get("iter_count", 0)), violation)
 
 
-@lru_cache(maxsize=256)
-def build_model(structure: Structure) -> Model:
-    """The model of a structure; made at the first call, kept after that.
-
-    Raises
-    ------
-    OutOfTime
-        If making it takes longer than there is time.
-    """
-    return Model(structure)
+#: The model of a structure, made at the first call and kept; :class:`repair.deadline.OutOfTime` if making it
+#: takes longer than there is time.
+build_model: KeptBySize[Structure, Model] = KeptBySize(Model, lambda structure: structure.megabytes, _KEPT)
 
 
 def status_of(model: Model, solution: Solution) -> SolveStatus:
