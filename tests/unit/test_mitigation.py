@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.unavoidable import KINDS, situation
 
 import repair
+from repair.certify.recompute import certify
 from repair.cli import main
 from repair.errors import RepairError
 from repair.mitigation.settings import MitigationConfig
@@ -251,3 +252,53 @@ def test_several_backends_at_one_time_are_drawn(tmp_path):
     assert len({p.t_rep for p in found.search.probes}) == 1
     assert any(p.solve.curve is None for p in found.search.probes)
     assert any(path.name == "birdseye.png" for path in found.save(tmp_path / "out"))
+
+
+def tampered(told, what):
+    one = told["mitigation"]
+    column = one["trajectory"]
+    if what == "impact speed":
+        one["impact_speed_mps"] -= 0.5
+    elif what == "full braking":
+        one["full_braking"]["impact_speed_mps"] += 0.5
+    elif what == "contact":
+        one["contact_t_s"] += 0.02
+    elif what == "obstacle":
+        one["obstacle_id"] = 30
+    elif what == "place":
+        column["x_m"] = [x - 0.3 for x in column["x_m"]]
+    elif what == "grip":
+        column["speed_mps"] = [v - 3.0 * t for v, t in zip(column["speed_mps"], column["t_s"], strict=True)]
+    elif what == "ends":
+        one.update(ends="none", contact_t_s=None)
+    elif what == "status":
+        told["status"] = "none_feasible"
+    elif what == "proof":
+        told["bound"]["kinds"]["vehicle"]["t_bound_s"] = 0.1
+        told["bound"]["t_bound_s"] = 0.1
+    return told
+
+
+def test_certified_and_not_when_tampered_with(tmp_path):
+    found = result_of(
+        tmp_path,
+        situation("rear", 15.0, 8.7, width=3.5),
+        "mitigation.wanted=true",
+        "backend=qptr",
+        "fallback=[]",
+    )
+    out = tmp_path / "out"
+    found.save(out, figure=False)
+    certificate = certify(out)
+    assert certificate.ok, certificate.broken
+    assert certificate.status == "unavoidable"
+    names = {row.name for row in certificate.rows}
+    assert {"status unavoidable", "mitigation: contact", "mitigation: impact speed off by"} <= names
+    assert "full braking: contact" in names
+    file = out / "result.json"
+    told = file.read_text(encoding="utf-8")
+    for what in (
+        "impact speed", "full braking", "contact", "obstacle", "place", "grip", "ends", "status", "proof",
+    ):  # fmt: skip
+        file.write_text(json.dumps(tampered(json.loads(told), what)), encoding="utf-8")
+        assert not certify(out).ok, what

@@ -16,7 +16,10 @@ from repair.timegrid import INSTANT
 if TYPE_CHECKING:
     from repair.preparation import Prepared
 
-__all__ = ["ContactTime", "contact_rows", "contact_time_row", "road_of", "road_rows", "traffic_words"]
+__all__ = [
+    "ContactTime", "beyond_the_road", "contact_rows", "contact_time_row", "road_of", "road_rows",
+    "traffic_words",
+]  # fmt: skip
 
 _CONTACT_TIME = (
     5e-3  # the contact of a reference is found to a millisecond, on another polygon of its way [s]

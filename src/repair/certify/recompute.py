@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from repair.certify.certificate import Certificate, CertificateRow
 from repair.certify.clearance import boxes_kept, clearance_rows, jump_said
 from repair.certify.hull import derivative_rows, seam_rows
+from repair.certify.late.impact import impact_rows, status_row
 from repair.certify.late.rows import late_rows
 from repair.certify.late.why import why_rows
 from repair.certify.limits import driven_rows, physical_rows, weakened
@@ -61,6 +62,7 @@ def certify(folder: Path) -> Certificate:
     folder = Path(folder)
     content = read_record(folder)
     said = bool((content.get("bound") or {}).get("proof_file") or content.get("explanation"))
+    said |= (content.get("mitigation") or {}).get("ends") is not None
     if content.get("solution_file") is None and not said:
         raise RepairError(
             f"{folder} holds no trajectory to certify: "
@@ -144,7 +146,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
 
 
 def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
-    """Of a result without a trajectory: what it says about when it is too late, and why."""
+    """Of a result without a repair: what it says about when it is too late, why, and what is hit then."""
     from repair.scene.reading import read_file
 
     path, prepared = _prepare(folder, content)
@@ -153,6 +155,7 @@ def _proofs(folder: Path, content: Mapping[str, Any]) -> Certificate:
     traffic = read_traffic(anew.scenario, problem, scene, prepared.config, scene.n_steps)
     rows = late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))
     rows += why_rows(content, prepared, other_versions(content))
+    rows += [*status_row(content, rows), *impact_rows(folder, content, prepared, anew, traffic)]
     scenario, backend, status = (str(content.get(name)) for name in ("scenario", "backend", "status"))
     words = traffic_words(traffic)
     return Certificate(folder, scenario, backend, status, None, tuple(rows), *_under(prepared), words)

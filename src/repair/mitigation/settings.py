@@ -20,7 +20,7 @@ class MitigationConfig:
         "where nothing is found: ask for the bound (vehicle), and look for the least impact speed",
     )
     time_limit: float = setting(
-        3.0,
+        10.0,
         "wall time for the look [s]; full braking is looked at in any case, and what is found by then stands",
         low=0.0,
         high=1e6,
