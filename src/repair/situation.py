@@ -16,6 +16,7 @@ from repair.problem.limits import Limits
 from repair.problem.settings import RepairConfig
 from repair.terminal.judge import EndJudge
 from repair.terminal.required import SafeEnds
+from repair.terminal.room import RoomToStop, room_to_stop
 from repair.terminal.verdict import Terminal
 from repair.timegrid import on_grid
 from repair.world.boxes import Occupancy
@@ -81,18 +82,30 @@ class Situation:
         checker, occupancy = self.checker, with_boxes(self.occupancy, self.dead_ends)
         return ProblemFactory(
             self.scene, self.settings, limits, occupancy, self.reference, self.t_end,
-            checker.config.clearance, checker.road,
+            checker.config.clearance, checker.road, self._afterwards(limits),
         )  # fmt: skip
+
+    def _afterwards(self, limits: Limits) -> RoomToStop | None:
+        config = self.checker.config
+        if config.terminal != "require":
+            return None
+        return room_to_stop(
+            self.scene, limits, self.t_end, config.clearance, config.terminal_wait, self._dead_ends
+        )
 
     @cached_property
     def dead_ends(self) -> list[tuple[Array, Array]]:
         """Where the path leaves the road within reach, as boxes in (s, l); see ``repair.road_ends``."""
-        road, scene, duration = self.checker.road, self.scene, self.t_end
+        v, duration = max(float(self.scene.start[1, 0]), 0.0), self.t_end
+        return self._dead_ends(v * duration + 0.5 * self.limits.a_max * duration**2)
+
+    def _dead_ends(self, ahead: float) -> list[tuple[Array, Array]]:
+        """Those up to a distance [m] after the start."""
+        road, scene = self.checker.road, self.scene
         if road is None or not self.settings.road_ends:
             return []
-        s, v = float(scene.start[0, 0]), max(float(scene.start[1, 0]), 0.0)
-        ahead = v * duration + 0.5 * self.limits.a_max * duration**2
-        return dead_ends(road, scene.frame, scene.vehicle, scene.road, s, ahead)
+        start = float(scene.start[0, 0])
+        return dead_ends(road, scene.frame, scene.vehicle, scene.road, start, ahead)
 
     @cached_property
     def ends(self) -> EndJudge:

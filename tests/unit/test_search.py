@@ -130,6 +130,27 @@ def test_bisect_visits_the_papers_iterates_of_scenario_1():
     assert result.f_ttr == pytest.approx(1.6)
 
 
+@pytest.mark.parametrize("rule", ["bisect", "guided", "as_printed"])
+def test_an_unsafe_end_of_the_first_says_nothing_of_later_ones(rule):
+    """Only ends between 0.4 and 1.2 s are safe, and until 1.6 s there is a repair."""
+
+    class Ends:
+        def check(self, problem, curve):
+            if problem.t_rep > 1.6 + 1e-9:
+                return Verdict((Violation(Reason.COLLISION, problem.t_rep),))
+            if 0.4 - 1e-9 <= problem.t_rep <= 1.2 + 1e-9:
+                return Verdict()
+            return Verdict((Violation(reason, problem.t_rep),))
+
+    reason = Reason.UNSAFE_END
+    result = search(Ends(), 2.9, rule=rule, delta_t=0.4)
+    assert result.status is SearchStatus.FOUND
+    assert 0.4 - 1e-9 <= result.f_ttr <= 1.2 + 1e-9
+    reason = Reason.COLLISION  # who strikes something is not asked for later ones
+    if rule == "bisect":
+        assert search(Ends(), 2.9, rule=rule, delta_t=0.4).f_ttr is None
+
+
 def test_bisect_visits_the_papers_iterates_of_scenario_2():
     result = search(until(0.8), 1.6, rule="bisect", delta_t=0.4)
     assert visited(result) == pytest.approx([0.0, 0.8, 1.2])

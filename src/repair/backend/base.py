@@ -98,11 +98,17 @@ class Closest:
         By how much it misses the margin [m].
     residuals : mapping
         Its own, as :class:`SolveResult` has them.
+    what : str
+        What it is, for people.
+    instead : Closest or None
+        Another one, where the checker rejects this one too.
     """
 
     curve: Curve
     miss: float
     residuals: Mapping[str, float] = field(default_factory=dict)
+    what: str = "that curve"
+    instead: Closest | None = None
 
 
 @dataclass(frozen=True)

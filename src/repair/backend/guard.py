@@ -77,12 +77,15 @@ def _wrong(answer: Any, problem: RepairProblem) -> str:
         return "stages that are no mapping of curves"
     if answer.curve is not None and (why := _wrong_curve(answer.curve, problem)):
         return why
-    closest: Any = answer.closest
+    return _wrong_closest(answer.closest, problem)
+
+
+def _wrong_closest(closest: Any, problem: RepairProblem) -> str:
     if closest is None:
         return ""
     if not isinstance(closest, Closest) or not isinstance(closest.miss, Real):
         return f"{kind_of(closest)} as its closest curve, no Closest"
-    return _wrong_curve(closest.curve, problem)
+    return _wrong_curve(closest.curve, problem) or _wrong_closest(closest.instead, problem)
 
 
 def _wrong_curve(curve: Any, problem: RepairProblem) -> str:

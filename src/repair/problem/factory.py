@@ -13,7 +13,7 @@ from repair.arrays import Array, frozen
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.limits import Limits
 from repair.problem.passing import open_passings
-from repair.problem.problem import Maneuver, Passing, RepairProblem
+from repair.problem.problem import Afterwards, Maneuver, Passing, RepairProblem
 from repair.problem.settings import RepairConfig
 from repair.problem.shapes import Shapes
 from repair.problem.surroundings import Surroundings, sides_of, surroundings
@@ -57,6 +57,8 @@ class ProblemFactory:
         What the checker wants around the ego's rectangle [m].
     boundary : RoadBoundary or None
         What it wants that rectangle to lie in.
+    afterwards : Afterwards or None
+        What is about after the repairs; None where nobody asks how they end.
     """
 
     scene: Scene
@@ -67,6 +69,7 @@ class ProblemFactory:
     t_end: float
     room: float = 0.0
     boundary: RoadBoundary | None = None
+    afterwards: Afterwards | None = None
 
     @cached_property
     def bounds(self) -> LateralBounds:
@@ -209,6 +212,7 @@ class ProblemFactory:
             strict=not self.settings.relax,
             lateral=lateral,
             shapes=self._shapes,
+            afterwards=self.afterwards,
         )
 
     def _scenery(

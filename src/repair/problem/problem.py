@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ from repair.problem.shapes import Shapes
 from repair.scene.road.bounds import LateralBounds
 from repair.world.boxes import Occupancy
 
-__all__ = ["SIDE_AXIS", "SIDE_SIGN", "Maneuver", "Passing", "RepairProblem", "Side"]
+__all__ = ["SIDE_AXIS", "SIDE_SIGN", "Afterwards", "Maneuver", "Passing", "RepairProblem", "Side"]
 
 
 class Maneuver(str, Enum):
@@ -87,6 +88,14 @@ class Passing:
         return np.asarray(self.side.take(index, axis=1, mode="clip"))
 
 
+class Afterwards(Protocol):
+    """What is about after a repair, for backends that can see to its end (``repair.terminal.room``)."""
+
+    def within(self, problem: RepairProblem, curve: Curve) -> Array:
+        """What bounds the state at the end so that it can be braked to a standstill from there."""
+        ...
+
+
 @dataclass(frozen=True)
 class RepairProblem:
     """Everything a backend may know about one repair: follow until ``t_rep``, evade until ``t_end``.
@@ -123,6 +132,8 @@ class RepairProblem:
         No part of the margin may be given up, whatever the checker says of the true rectangles.
     shapes : Shapes or None
         What the boxes stand for, in the plane; None where only the boxes are known.
+    afterwards : Afterwards or None
+        What is about after the repair; None where nobody asks how it ends.
     """
 
     reference: Curve
@@ -142,6 +153,7 @@ class RepairProblem:
     lateral: bool = True
     strict: bool = False
     shapes: Shapes | None = None
+    afterwards: Afterwards | None = None
 
     def tightened(self, room: float, edge: float, unused: float) -> RepairProblem:
         """The same way past the obstacles, to be kept with more to spare.

@@ -176,17 +176,19 @@ def _judged(
     """What a backend found, what the checker says of it, and the margin it keeps [m]."""
     verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
     margin = problem.margin
-    closest = solve.closest
-    if not verdict.ok and closest is not None and not problem.strict:
+    closest = None if verdict.ok else solve.closest
+    while closest is not None:
         # What the backend says of the problem stays; but boxes are wider than vehicles, and the checker
         # may accept the curve that comes closest.
-        again = checker.check(problem, closest.curve)
-        if again.ok:
-            margin -= closest.miss
-            detail = f"{solve.detail}; that curve passes every check, with a margin of {margin:.2f} m"
-            residuals = closest.residuals or solve.residuals
-            solve = replace(solve, curve=closest.curve, detail=detail, residuals=residuals)
-            verdict = again
+        if closest.miss <= 0.0 or not problem.strict:
+            again = checker.check(problem, closest.curve)
+            if again.ok:
+                margin -= closest.miss
+                detail = f"{solve.detail}; {closest.what} passes every check, with a margin of {margin:.2f} m"
+                residuals = closest.residuals or solve.residuals
+                solve = replace(solve, curve=closest.curve, detail=detail, residuals=residuals)
+                return solve, again, margin
+        closest = closest.instead
     return solve, verdict, margin
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from repair.backend.base import RepairBackend
-from repair.check.verdict import Conflict
+from repair.check.verdict import Conflict, Reason
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime
 from repair.problem.problem import Maneuver, RepairProblem
@@ -22,7 +22,7 @@ from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import IsOpen, Order, probe_order
 from repair.search.settings import SearchConfig
-from repair.timegrid import ROUNDING, on_grid
+from repair.timegrid import INSTANT, ROUNDING, on_grid
 
 __all__ = ["iter_probes", "search_f_ttr"]
 
@@ -79,10 +79,19 @@ def iter_probes(
             probe = _visit(t_rep, first, source, backend, checker, settings.sides, warm_start, budget)
         if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
-        answer = probe.feasible
+        answer = probe.feasible or _says_nothing_of_later_ones(probe)
         yield probe
-        if budget.cut and not answer:
+        if budget.cut and not probe.feasible:
             raise OutOfTime  # nobody knows whether it would have been feasible
+
+
+def _says_nothing_of_later_ones(probe: Probe) -> bool:
+    """Whether the first time-to-repair fails by its end alone (``checker.terminal: require``).
+
+    Who begins at once ends sooner, elsewhere and faster or slower than who begins later: a rule that takes
+    feasibility to be contiguous would end here, or turn around.
+    """
+    return probe.t_rep < INSTANT and {v.reason for v in probe.verdict.violations} == {Reason.UNSAFE_END}
 
 
 def _order(settings: SearchConfig, end: float, is_open: IsOpen, after: Probe | None) -> Order:

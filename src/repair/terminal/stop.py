@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from repair.problem.limits import Limits
     from repair.scene.frame import FrenetFrame
 
-__all__ = ["Settling", "Stop", "settling_from", "stop_along"]
+__all__ = ["RESERVE", "Settling", "Stop", "settling_from", "stop_along"]
 
-_RESERVE = 0.98  # share of every limit that a stop uses: it is laid out by samples, and checked at all times
+#: Share of every limit that a stop uses: it is laid out by samples, and checked at all times.
+RESERVE = 0.98
 _SPACING = 0.25  # at which the path is looked at [m]
 _STANDS = 1e-2  # below this speed [m/s] a path has no direction
 _RESTS = 1e-6  # what is slower than this is at rest, whatever its last digits [m/s]
@@ -144,7 +145,7 @@ def stop_along(
     """
     t, s, v = float(state.t[0]), float(state.position[0, 0]), max(float(state.velocity[0, 0]), 0.0)
     begin = s
-    reach = v * v / (2.0 * share * _RESERVE * -limits.a_min) * 1.5 + v * dt + 1.0
+    reach = v * v / (2.0 * share * RESERVE * -limits.a_min) * 1.5 + v * dt + 1.0
     places = s + np.arange(0.0, reach + _SPACING, _SPACING)
     forward, along, across = _demands(path, frame, places)
     phases, since = [], 0.0
@@ -154,7 +155,7 @@ def stop_along(
         if here.start >= len(places) - 1 or since > _LONGEST:
             return None
         bend = float(across[here].max()) * v * v
-        room = min(_RESERVE * -limits.a_min, math.sqrt(max((_RESERVE * limits.a_total) ** 2 - bend**2, 0.0)))
+        room = min(RESERVE * -limits.a_min, math.sqrt(max((RESERVE * limits.a_total) ** 2 - bend**2, 0.0)))
         rate = share * (room + float(along[here].min()) * v * v) / float(forward[here].max())
         if bend > limits.a_lat or rate <= 0.0:
             return None

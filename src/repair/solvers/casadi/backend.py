@@ -30,11 +30,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.backend.base import Capabilities, Closest, Configuration, SolveResult, SolveStatus
+from repair.backend.stopping import able_to_stop
 from repair.curves.base import Curve
 from repair.curves.bases import n_points_for
 from repair.curves.bspline import UniformBSpline
@@ -42,9 +44,15 @@ from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime, until
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
-from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out
+from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out, overhang_of
 from repair.solvers.casadi.model import TOLERANCE, Model, build_model, status_of
-from repair.solvers.casadi.residuals import largest_violation, residuals_of, start_violation, worst_family
+from repair.solvers.casadi.residuals import (
+    largest_violation,
+    require_whole,
+    residuals_of,
+    start_violation,
+    worst_family,
+)
 from repair.solvers.casadi.rows import Structure
 from repair.solvers.casadi.separation import Separation, separate
 from repair.solvers.casadi.settings import CasadiConfig
@@ -91,7 +99,7 @@ class CasadiBackend:
             If the problem is malformed (no time left between t_rep and t_end, states not finite).
         """
         begin = time.perf_counter()
-        _require(problem)
+        require_whole(problem)
         deadline = None if time_limit is None else begin + time_limit
         try:
             with until(deadline):
@@ -99,6 +107,7 @@ class CasadiBackend:
                 instance, points = lay_out(problem, model)
                 built, before = time.perf_counter(), model.build_time
                 result = self._rounds(instance, points, warm_start, deadline, time_limit)
+                result = able_to_stop(result, problem, partial(self._bounded, problem, deadline, time_limit))
                 if warm_start is not None and abs(warm_start.t_start - problem.t_rep) <= INSTANT:
                     result = self._nearest(result, problem, model, warm_start, deadline)
         except OutOfTime as over:
@@ -112,7 +121,7 @@ class CasadiBackend:
         spent = time.perf_counter() - built
         return replace(result, build_time=built - begin + late, solve_time=spent - late)
 
-    def structure(self, problem: RepairProblem, *, timed: bool = False) -> Structure:
+    def structure(self, problem: RepairProblem, *, timed: bool = False, bounded: bool = False) -> Structure:
         """The structure of a problem: what its model depends on.
 
         Parameters
@@ -120,6 +129,8 @@ class CasadiBackend:
         problem : RepairProblem
         timed : bool
             The solver can be stopped in time.
+        bounded : bool
+            The end has to leave room for a stop.
         """
         c = self.config
         return Structure(
@@ -134,9 +145,21 @@ class CasadiBackend:
             max_iterations=c.max_iterations,
             tolerance=c.tolerance,
             tangent=float(np.tan(c.heading)),
-            overhang=_overhang(problem) if c.overhang is None else c.overhang,
+            overhang=overhang_of(problem) if c.overhang is None else c.overhang,
             timed=timed,
+            ending=round(problem.t_end - problem.t_rep, 9) if bounded else None,
         )
+
+    def _bounded(
+        self, problem: RepairProblem, deadline: float | None, time_limit: float | None, within: Array
+    ) -> SolveResult:
+        """As :meth:`_rounds`, with the end within bounds."""
+        try:
+            model = build_model(self.structure(problem, timed=time_limit is not None, bounded=True))
+            instance, points = lay_out(problem, model, within)
+            return self._rounds(instance, points, None, deadline, time_limit)
+        except OutOfTime as over:  # what was found before stays
+            return SolveResult(SolveStatus.TIME_LIMIT, detail=_cut(time_limit, over))
 
     def _rounds(
         self,
@@ -216,7 +239,8 @@ class CasadiBackend:
             if points is not None:
                 miss = problem.margin - instance.problem.margin
                 residuals = residuals_of(instance, separation, points) | {"obstacles": miss}
-                nearest = Closest(self._curve(instance, points), miss, residuals)
+                before = None if problem.afterwards is None else result.closest
+                nearest = Closest(self._curve(instance, points), miss, residuals, instead=before)
                 return replace(result, closest=nearest, detail=detail)
         return replace(result, detail=f"{detail}, and nothing near it keeps all rows")
 
@@ -319,18 +343,6 @@ def _cut(time_limit: float | None, why: OutOfTime | None = None) -> str:
     """That there was no time, and for what, as a sentence."""
     said = "no time is left" if time_limit is None else f"time limit of {time_limit:g} s"
     return f"{said}: {why}" if why is not None and str(why) else said
-
-
-def _overhang(problem: RepairProblem) -> float:
-    """Half the length of the body [m], to the next centimetre: a little more than it is, never less."""
-    return float(np.ceil(100.0 * problem.half_length - 1e-9) / 100.0)
-
-
-def _require(problem: RepairProblem) -> None:
-    if not problem.t_end - problem.t_rep > INSTANT:
-        raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
-    if not np.isfinite(problem.start).all():
-        raise BackendError(f"the state at t_rep = {problem.t_rep:g} s is not finite")
 
 
 def make(config: Configuration) -> CasadiBackend:

@@ -28,6 +28,7 @@ __all__ = [
     "in_plane",
     "lay_out",
     "limit_values",
+    "overhang_of",
     "plane_acceleration",
 ]
 
@@ -70,7 +71,7 @@ def in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=128)
 def limit_values(limits: Limits) -> tuple[Array, Array]:
-    """Smallest and largest value (12,) of every :class:`repair.solvers.casadi.rows.RowKind`."""
+    """Smallest and largest value (13,) of every :class:`repair.solvers.casadi.rows.RowKind`."""
     side = limits.a_lat if limits.a_lat < limits.a_total - 1e-9 else _INF
     values = {
         RowKind.VELOCITY_S: (0.0, limits.v_max),
@@ -85,9 +86,15 @@ def limit_values(limits: Limits) -> tuple[Array, Array]:
         RowKind.ACROSS: (-side, side),
         RowKind.ALONG: (limits.a_min, limits.a_max),
         RowKind.CURVATURE: (-limits.curvature, limits.curvature),
+        RowKind.STOP: (-_INF, _INF),
     }
     low, high = zip(*(values[kind] for kind in RowKind), strict=True)
     return frozen(low), frozen(high)
+
+
+def overhang_of(problem: RepairProblem) -> float:
+    """Half the length of the body [m], to the next centimetre: a little more than it is, never less."""
+    return float(np.ceil(100.0 * problem.half_length - 1e-9) / 100.0)
 
 
 class Instance:
@@ -101,10 +108,15 @@ class Instance:
         What is taken off the positions: s at the start, and 0.
     head : (p, 2) array
         The given control points, less the origin.
+    within : (K,) array, optional
+        What the end is bounded by, see :mod:`repair.terminal.room`; goes with ``Structure.ending``.
     """
 
-    def __init__(self, problem: RepairProblem, model: Model, origin: Array, head: Array) -> None:
+    def __init__(
+        self, problem: RepairProblem, model: Model, origin: Array, head: Array, within: Array | None = None
+    ) -> None:
         self.problem, self.model, self.origin, self.head = problem, model, origin, head
+        self.within = within
         self.windows = self._windows()
         self.limits = limit_values(problem.limits)  # by kind of row
         self.relaxed: Array | None = None  # the optimum of the linear rows, once it is known
@@ -208,6 +220,9 @@ class Instance:
                 lower = np.maximum(lower, np.minimum(here - trust, upper))
                 upper = np.minimum(upper, np.maximum(here + trust, lower))
             low[span], high[span] = lower, upper
+        if model.stopping is not None and self.within is not None:
+            kept, span = model.stopping
+            high[span] = self.within[kept] - self.given[span] - self.origin[0]
         if self.problem.lateral and around is not None:
             s = model.samples[0] @ around[:, 0] + self.origin[0]
             ends = slice(len(low) - 2 * len(s), None)
@@ -286,7 +301,7 @@ class Instance:
         return right, left
 
 
-def lay_out(problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
+def lay_out(problem: RepairProblem, model: Model, within: Array | None = None) -> tuple[Instance, Array]:
     """The instance of a problem, and its initial control points (n, 2) less the origin: the guide's."""
     structure = model.structure
     n, p, h = structure.n, structure.degree, structure.spacing
@@ -300,5 +315,5 @@ def lay_out(problem: RepairProblem, model: Model) -> tuple[Instance, Array]:
     points[:p] = head
     if not problem.lateral and problem.passing is not None:
         points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
-    instance = Instance(problem, model, origin, head)
+    instance = Instance(problem, model, origin, head, within)
     return instance, instance.on_path(points)

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from repair.arrays import Array
+from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.instance import Instance, axis_curvature, in_plane, plane_acceleration
 from repair.solvers.casadi.model import TOLERANCE
 from repair.solvers.casadi.nlp import STANDSTILL
-from repair.solvers.casadi.rows import FAMILIES
+from repair.solvers.casadi.rows import FAMILIES, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
+from repair.timegrid import INSTANT
 
-__all__ = ["largest_violation", "residuals_of", "start_violation", "worst_family"]
+__all__ = ["largest_violation", "require_whole", "residuals_of", "start_violation", "worst_family"]
 
 
 def residuals_of(instance: Instance, separation: Separation, points: Array) -> dict[str, float]:
@@ -45,6 +47,9 @@ def residuals_of(instance: Instance, separation: Separation, points: Array) -> d
         v = value[: first[1]]
         found["heading"] = max(float((np.abs(v[:, 1]) - model.structure.tangent * v[:, 0]).max()), 0.0)
         found["road"] = _road_violation(instance, placed)
+    if instance.within is not None:
+        ends = next(rows.matrix for rows in model.linear if rows.kind == RowKind.STOP) @ points[:, 0]
+        found["ending"] = _excess((ends + instance.origin[0] - instance.within).max())
     return found | _plane_violations(instance, states)
 
 
@@ -89,6 +94,20 @@ def _road_violation(instance: Instance, placed: Array) -> float:
 def _excess(*values: Any) -> float:
     """The largest of 0 and these numbers; NaN if one of them is (the built-in ``max`` may lose it)."""
     return float(np.maximum.reduce((0.0, *values)))
+
+
+def require_whole(problem: RepairProblem) -> None:
+    """See that a problem is one.
+
+    Raises
+    ------
+    BackendError
+        If no time is left between t_rep and t_end, or the start is not finite.
+    """
+    if not problem.t_end - problem.t_rep > INSTANT:
+        raise BackendError(f"the repair ends at {problem.t_end:g} s, before it begins at {problem.t_rep:g} s")
+    if not np.isfinite(problem.start).all():
+        raise BackendError(f"the state at t_rep = {problem.t_rep:g} s is not finite")
 
 
 def start_violation(problem: RepairProblem) -> str:

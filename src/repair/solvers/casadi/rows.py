@@ -19,6 +19,7 @@ import numpy.typing as npt
 from repair.arrays import Array, frozen
 from repair.curves.bases import basis_matrix, derivative_matrix, segment_matrix, to_bernstein
 from repair.curves.bspline import greville_offsets
+from repair.terminal.room import STOP_TIMES
 
 __all__ = ["FAMILIES", "SAMPLED", "Datum", "Layout", "RowKind", "Rows", "Structure", "bernstein_rows"]
 
@@ -41,6 +42,7 @@ class RowKind(IntEnum):
     ACROSS = 9  #: the acceleration across the axis
     ALONG = 10  #: the acceleration along the axis
     CURVATURE = 11  #: that of the driven path
+    STOP = 12  #: where the vehicle could be brought to rest after the end
 
 
 class Datum(IntEnum):
@@ -98,6 +100,8 @@ class Structure:
         Half length of the body that the road must hold [m].
     timed : bool
         The solver asks after every iteration whether there is time left.
+    ending : float or None
+        The repair's end since t_rep [s], where that has to leave room for a stop.
     """
 
     n: int
@@ -113,6 +117,7 @@ class Structure:
     tangent: float
     overhang: float
     timed: bool = False
+    ending: float | None = None
 
     @property
     def points(self) -> int:
@@ -186,7 +191,7 @@ class Rows:
     Attributes
     ----------
     family : str
-        One of ``FAMILIES``.
+        One of ``FAMILIES``, or ``ending``.
     axis : int
         0 for s, 1 for l.
     kind : RowKind
@@ -238,6 +243,8 @@ class Layout:
         Their number L.
     bounded : list of tuples
         Axis, ``kept`` and place in those rows of each axis' obstacle rows.
+    stopping : tuple or None
+        ``kept`` and place in those rows of those that bound the end.
     kind : int array
         :class:`RowKind` of each row, the nonlinear ones included.
     order : int array
@@ -297,11 +304,16 @@ class Layout:
 
     def _linear_rows(self) -> list[Rows]:
         matrices = (self.velocity, self.acceleration, self.jerk, self.obstacle)
-        return [
+        rows = [
             Rows(family, axis, kind, matrix)
             for axis in range(self.structure.axes)
             for family, kind, matrix in zip(FAMILIES, _KINDS[axis], matrices, strict=True)
         ]
+        s = self.structure
+        if s.ending is not None:  # s + v tau at the end, see repair.terminal.room
+            place, rate = (basis_matrix([s.ending], s.n, s.degree, s.spacing, k) for k in range(2))
+            rows.append(Rows("ending", 0, RowKind.STOP, place + STOP_TIMES[:, None] * rate))
+        return rows
 
     def _over_unknowns(self) -> None:
         """The linear rows over the unknowns and over the given control points."""
@@ -309,8 +321,11 @@ class Layout:
         free, given = [], []
         kind: list[int] = []
         self.bounded: list[tuple[int, npt.NDArray[np.intp], slice]] = []
+        self.stopping: tuple[npt.NDArray[np.intp], slice] | None = None
         for rows, kept in zip(self.linear, self.kept, strict=True):
             picked = rows.matrix[kept]
+            if rows.kind == RowKind.STOP:
+                self.stopping = kept, slice(len(kind), len(kind) + len(kept))
             if rows.kind == RowKind.PLACE:
                 self.bounded.append((rows.axis, kept, slice(len(kind), len(kind) + len(kept))))
             free.append(np.kron(np.arange(s.axes) == rows.axis, picked[:, p:]))
