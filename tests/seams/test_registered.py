@@ -11,34 +11,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from tests import roads
+from tests.registries import REGISTRIES, nothing_left
 
 import repair
 from repair.backend.base import Capabilities
-from repair.check.registry import CHECKS
 from repair.check.verdict import Reason, Violation
 from repair.errors import ConfigError, RepairError
 from repair.metrics.base import MetricValue
-from repair.metrics.registry import METRICS
 from repair.reference.profile import SpeedProfile
-from repair.reference.registry import SOURCES
-from repair.save import FORMATS, Files
+from repair.save import Files
 from repair.search.rules import RULES
 from repair.settings import setting
 from repair.solvers.registry import BACKENDS
-from repair.vehicle.model import VEHICLES, KinematicSingleTrack
+from repair.vehicle.model import KinematicSingleTrack
 from repair.vehicle.parameters import load_vehicle
-
-REGISTRIES = (BACKENDS, CHECKS, FORMATS, METRICS, RULES, SOURCES, VEHICLES)
 
 
 @pytest.fixture(autouse=True)
 def nothing_is_left():
-    before = [registry.names() for registry in REGISTRIES]
-    yield
-    for registry, names in zip(REGISTRIES, before, strict=True):
-        for name in registry.names():
-            if name not in names:
-                registry.unregister(name)
+    with nothing_left():
+        yield
 
 
 @pytest.fixture
@@ -81,7 +73,7 @@ def test_a_backend(path):
             return repair.SolveResult(repair.SolveStatus.INFEASIBLE, detail=f"share {self.settings.share:g}")
 
     repair.register_backend("lazy", Lazy, settings=LazyConfig)
-    result = repair.repair(path, backend="lazy", overrides=["lazy.share=0.25", "reference.source=constant"])
+    result = repair.repair(path, backend="lazy", overrides=["lazy.share=0.25", "reference.source=constant", "fallback=[]"])
     assert result.status is repair.SearchStatus.NONE_FEASIBLE
     assert result.search.probes[0].solve.detail == "share 0.25"
     assert asked == [(0.0, None)] * len(asked)

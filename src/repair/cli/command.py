@@ -18,7 +18,7 @@ from repair.cli.arguments import UsageError, no_arguments
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
 
-__all__ = ["entry", "main"]
+__all__ = ["entry", "main", "parser"]
 
 
 class _Parser(argparse.ArgumentParser):
@@ -73,24 +73,25 @@ VERBS: tuple[Verb, ...] = (
 )
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="repair", description="Trajectory repair on CommonRoad scenarios.")
-    parser.add_argument("--version", action="store_true", help="print the version and exit")
-    added = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
+def parser() -> argparse.ArgumentParser:
+    """All verbs with their options."""
+    made = _Parser(prog="repair", description="Trajectory repair on CommonRoad scenarios.")
+    made.add_argument("--version", action="store_true", help="print the version and exit")
+    added = made.add_subparsers(dest="verb", metavar="VERB", title="verbs")
     for verb in VERBS:
         own = added.add_parser(
             verb.name, help=verb.help, description=verb.help[0].upper() + verb.help[1:] + "."
         )
         verb.arguments(own)
         own.set_defaults(run=verb.run)
-    return parser
+    return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status. Errors of the user's input end as one sentence on stderr."""
     with lenient():
         try:
-            return _run(_parser(), argv)
+            return _run(argv)
         except RepairError as error:
             print(f"repair: {' '.join(str(error).split())}", file=sys.stderr)
             return 2
@@ -110,15 +111,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 2
 
 
-def _run(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
-    arguments = parser.parse_args(argv)
+def _run(argv: Sequence[str] | None) -> int:
+    known = parser()
+    arguments = known.parse_args(argv)
     if arguments.version:
         import repair
 
         print(f"commonroad-repair {repair.__version__}")
         return 0
     if arguments.verb is None:
-        parser.print_help()
+        known.print_help()
         return 0
     try:
         status: int = arguments.run(arguments)
