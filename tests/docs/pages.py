@@ -1,7 +1,8 @@
 """The code blocks of the pages: which there are, and how they are run.
 
-A block runs unless a comment right above it says otherwise: ``<!-- not run: why -->``, or ``<!-- slow -->``, by which
-it is left to the exhaustive tests. Blocks of one page run in its order, in one folder and one namespace.
+A block runs unless a comment right above it says otherwise: ``<!-- not run: why -->``, or ``<!-- slow -->``,
+by which it is left to the exhaustive tests; so is a command with a CommonRoad file that is not bundled.
+Blocks of one page run in its order, in one folder and one namespace.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
 _FENCE = re.compile(r"(?:^<!-- (?P<mark>.*?) -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
+_ELSEWHERE = re.compile(r"^\$ .* [A-Z]{3}_[\w-]+", re.M)
 _INDENTED = re.compile(r"(?<=\n\n)(?: {4}.*\n)+", re.M)
 # Wall times differ from run to run: a row of probes ends with two, and a line is made of nothing else.
 _TIMES = re.compile(r"(\s+\d+\.\d){2}$|^Time .*")
@@ -36,7 +38,7 @@ class Block:
         """``run``, ``slow`` or ``not run``."""
         if self.mark.startswith("not run: "):
             return "not run"
-        return "slow" if self.mark == "slow" else "run"
+        return "slow" if self.mark == "slow" or _ELSEWHERE.search(self.text) else "run"
 
     def __str__(self) -> str:
         return f"{self.page.name}:{self.line}"
@@ -61,6 +63,11 @@ def words(line: str) -> list[str]:
 def masked(line: str) -> str:
     """A line without what differs from run to run."""
     return _TIMES.sub("", line.rstrip())
+
+
+def says(printed: str, line: str) -> bool:
+    """Whether a printed line is the one that a page shows; a page may end it with three dots."""
+    return printed.startswith(line[:-3].rstrip()) if line.endswith("...") else printed == line
 
 
 def blocks(page: Path) -> list[Block]:
