@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util import logging
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
@@ -48,16 +50,25 @@ html_copy_source = False
 html_math_renderer = "mathml"
 
 
+def _mathml(node: nodes.Element, as_block: bool) -> str:
+    """An equation as MathML; what cannot be read is a warning, which ends the build."""
+    try:
+        return str(tex2mathml(node.astext(), as_block=as_block))
+    except MathError as error:
+        logging.getLogger(__name__).warning("%s", error, location=node)
+        return ""
+
+
 def _inline(self: Any, node: nodes.math) -> None:
     """An equation within a line."""
-    self.body.append(tex2mathml(node.astext()))
+    self.body.append(_mathml(node, False))
     raise nodes.SkipNode
 
 
 def _block(self: Any, node: nodes.math_block) -> None:
     """An equation of its own, with its number where it has a label."""
     number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
-    self.body.append(f'<div class="math-block">{number}{tex2mathml(node.astext(), as_block=True)}</div>\n')
+    self.body.append(f'<div class="math-block">{number}{_mathml(node, True)}</div>\n')
     raise nodes.SkipNode
 
 

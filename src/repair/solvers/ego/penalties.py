@@ -90,7 +90,7 @@ def feasibility_bounds(
     joint_factor : float
         c_j as a multiple of c_m.
     reverse_weight : float
-        Weight of longitudinal speeds below zero. The paper bounds |v| only, which lets a repaired
+        Weight of longitudinal speeds below zero. The paper bounds ``|v|`` only, which lets a repaired
         car reverse; here the lower bound of the longitudinal speed is zero, and not elastic.
 
     Returns
