@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from repair.curves.base import FrenetTrajectory
     from repair.curves.bspline import UniformBSpline
     from repair.cycle import Cycle, Repairer
+    from repair.cycle.planner import RepairingPlanner
     from repair.errors import (
         BackendError,
         ConfigError,
@@ -87,6 +88,7 @@ __all__ = [
     "RepairProblem",
     "RepairResult",
     "Repairer",
+    "RepairingPlanner",
     "ScenarioError",
     "Scene",
     "SearchResult",
@@ -130,6 +132,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.config": ("Config", "load_config", "preset_names"),
     "repair.curves.base": ("FrenetTrajectory",),
     "repair.cycle": ("Cycle", "Repairer"),
+    "repair.cycle.planner": ("RepairingPlanner",),
     "repair.curves.bspline": ("UniformBSpline",),
     "repair.errors": (
         "BackendError", "ConfigError", "OutputError", "ReferenceTrajectoryError", "RepairError",

@@ -19,8 +19,8 @@ from repair.check.verdict import Reason
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
-from repair.problem.factory import room_of
-from repair.problem.limits import Limits, reference_limits, resolve_limits
+from repair.problem.factory import part_in_reach
+from repair.problem.limits import reference_limits, resolve_limits
 from repair.reference.consistency import Recording
 from repair.reference.given import GivenReference, given_reference
 from repair.reference.registry import (
@@ -38,15 +38,13 @@ from repair.situation import Situation
 from repair.solvers.registry import sections
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.vehicle.parameters import Vehicle
-from repair.world.occupancy import Within, build_occupancy, shrink_to_start
+from repair.world.occupancy import build_occupancy, shrink_to_start
 
 __all__ = ["Phases", "Prepared", "again_for", "among", "laid_out", "prepare", "what_matters"]
 
 # Wider than a rounding error, narrower than anything that matters: what is kept by default beyond
 # half of the vehicle, because a box in (s, l) is not the vehicle's rectangle.
 _BODY_MARGIN = 0.1
-# What counts as out of reach is farther away along the path, and beside it, than the ego may be by this [m].
-_SLACK, _BESIDE = 5.0, 1.0
 # What CommonRoad's drivability checker judges as well.
 _JUDGED = {Reason.KINEMATICS.value, Reason.LIMITS.value}
 # What is asked of something prepared, and changes nothing about it; nor do the sections of the backends.
@@ -195,7 +193,8 @@ def laid_out(
     l_offset = vehicle.half_width + room if l_offset is None else l_offset
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
     with phases("occupancy"):
-        part = _reach(scene, config, limits, given) if within_reach else None
+        places = given.positions if given is not None and within_reach else None
+        part = None if places is None else part_in_reach(scene, config.repair, limits, places)
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset, part)
     with phases("checker"):
         allowed = [reference_limits(limits, config.limits, vehicle, accepted=told) for told in (False, True)]
@@ -256,23 +255,6 @@ def laid_out(
         phases=phases.seconds,
         given=given,
     )
-
-
-def _reach(scene: Scene, config: Config, limits: Limits, given: GivenReference | None) -> Within | None:
-    """Where the ego may be until its reference ends; None where that is not known."""
-    positions = None if given is None else given.positions
-    if positions is None:
-        return None
-    (s, aside), (speed, _) = scene.start[:2].tolist()
-    duration, end = (len(positions) - 1) * scene.dt, scene.frame.to_frenet(positions[-1:])[0, 0]
-    ahead = min(max(speed, 0.0) + 0.5 * limits.a_max * duration, max(limits.v_max, speed)) * duration
-    repair = config.repair
-    first, last = s - _SLACK, float(np.fmax(s + ahead, end)) + _SLACK
-    bound = room_of(scene, repair)
-    part = slice(*np.searchsorted(bound.s, (first - _SLACK, last + _SLACK)))
-    room = max(float(np.abs(side[part]).max(initial=0.0)) for side in (bound.right, bound.left))
-    more = repair.margin + repair.clearance + max(repair.widen, default=0.0)
-    return Within(first, last, room + more + abs(aside) + _BESIDE)
 
 
 def _accepted(recording: Recording, vehicle: Vehicle) -> str:

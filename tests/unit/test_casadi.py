@@ -19,7 +19,7 @@ from repair.scene.road.bounds import LateralBounds
 from repair.solvers.casadi.backend import CasadiBackend
 from repair.solvers.casadi.buffered import Buffered, KeptBySize
 from repair.solvers.casadi.instance import lay_out, limit_values, plane_acceleration
-from repair.solvers.casadi.model import Model, Solution, build_model
+from repair.solvers.casadi.model import Model, Solution, build_model, megabytes
 from repair.solvers.casadi.residuals import residuals_of
 from repair.solvers.casadi.rows import RowKind
 from repair.solvers.casadi.separation import NOBODY, ROAD, SIDE_OF_BOUND, road_room, separate
@@ -271,7 +271,7 @@ def test_the_model_is_built_once():
 
 def test_models_are_kept_as_far_as_there_is_room():
     structure = CasadiBackend().structure(problems.static_block())
-    kept = KeptBySize(lambda key: object(), lambda key: key.megabytes, 3.5 * structure.megabytes)
+    kept = KeptBySize(lambda key: object(), megabytes, 3.5 * megabytes(structure))
     four = [replace(structure, tolerance=10.0**-k) for k in range(4, 8)]
     made = [kept(key) for key in four[:3]]
     assert [kept(key) for key in four[:3]] == made

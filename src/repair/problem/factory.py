@@ -22,13 +22,15 @@ from repair.problem.taken import begun
 from repair.scene.road.bounds import LateralBounds
 from repair.timegrid import INSTANT, intervals
 from repair.world.boxes import Occupancy
-from repair.world.occupancy import near, relevant
+from repair.world.occupancy import Within, near, relevant
 from repair.world.road import RoadBoundary
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["ProblemFactory", "Unguided", "room_of"]
+__all__ = ["ProblemFactory", "Unguided", "part_in_reach", "room_of"]
+# What counts as out of reach is farther away along the path, and beside it, than the ego may be by this [m].
+_SLACK, _BESIDE = 5.0, 1.0
 # Where the lateral room is looked up, from the hindmost to the foremost place within reach.
 _SHARES = frozen(np.linspace(0.0, 1.0, 50))
 
@@ -37,6 +39,25 @@ def room_of(scene: Scene, settings: RepairConfig) -> LateralBounds:
     """Lateral room of the reference point in a scene, as ``repair.lateral`` says."""
     wide = {"lane": scene.lane, "same_direction": scene.same_direction, "road": scene.road}
     return wide.get(settings.lateral, scene.lane)
+
+
+def part_in_reach(scene: Scene, settings: RepairConfig, limits: Limits, positions: Array) -> Within:
+    """The part of the road where the ego may be until its reference ends.
+
+    Parameters
+    ----------
+    positions : (K, 2) array
+        The reference at the scenario's steps [m].
+    """
+    (s, aside), (speed, _) = scene.start[:2].tolist()
+    duration, end = (len(positions) - 1) * scene.dt, scene.frame.to_frenet(positions[-1:])[0, 0]
+    ahead = min(max(speed, 0.0) + 0.5 * limits.a_max * duration, max(limits.v_max, speed)) * duration
+    first, last = s - _SLACK, float(np.fmax(s + ahead, end)) + _SLACK
+    bound = room_of(scene, settings)
+    part = slice(*np.searchsorted(bound.s, (first - _SLACK, last + _SLACK)))
+    room = max(float(np.abs(side[part]).max(initial=0.0)) for side in (bound.right, bound.left))
+    more = settings.margin + settings.clearance + max(settings.widen, default=0.0)
+    return Within(first, last, room + more + abs(aside) + _BESIDE)
 
 
 @dataclass(frozen=True)

@@ -130,11 +130,6 @@ class Structure:
         return self.segments**2 * self.axes * (self.degree * (self.windows + 3) * self.axes)
 
     @property
-    def megabytes(self) -> float:
-        """About how much memory a model takes, its NLP included (measured, within a third)."""
-        return 4e-5 * self.entries + (0.17 if self.lateral else 0.065) * self.points
-
-    @property
     def segments(self) -> int:
         """Number of polynomial pieces."""
         return self.n - self.degree
