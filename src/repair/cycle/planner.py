@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["RepairingPlanner"]
 
 
-class RepairingPlanner(TrajectoryPlannerInterface):
+class RepairingPlanner(TrajectoryPlannerInterface):  # type: ignore[misc]  # commonroad-io has no types
     """Asks another planner for its trajectory, and repairs it.
 
     Parameters
