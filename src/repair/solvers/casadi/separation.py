@@ -62,6 +62,8 @@ class Separation:
         What each obstacle asks for.
     why : str
         A conflict known before any solver is asked; empty where there is none.
+    lent : float
+        By how much less than the margin is asked for, at most [m]: who starts nearer keeps that distance.
     """
 
     lower: Array
@@ -71,6 +73,7 @@ class Separation:
     side: npt.NDArray[np.intp] | None = None
     claims: Array | None = None
     why: str = ""
+    lent: float = 0.0
 
     @cached_property
     def times(self) -> Array:
@@ -126,9 +129,9 @@ def separate(
     """
     boxes = boxes or boxes_in(problem, windows)
     ids, table = problem.occupancy.ids, np.full((rows, len(_SIDES)), -np.inf)
-    claims, why = None, ""
+    claims, why, lent = None, "", 0.0
     if boxes is not None:
-        side, claims, why = _claims(problem, boxes, shape, room, side)
+        side, claims, why, lent = _claims(problem, boxes, shape, room, side)
     if claims is not None:
         tight = claims.max(axis=1)  # (C, W, 4)
     else:
@@ -140,7 +143,7 @@ def separate(
     table[windows.row[:, :-1]] = tight[:-1].swapaxes(0, 1)
     last = windows.row[:, -1]
     table[last] = np.maximum(table[last], tight[-1])
-    return Separation(table[:, _LOWER], -table[:, _UPPER], windows, ids, side, claims, why)
+    return Separation(table[:, _LOWER], -table[:, _UPPER], windows, ids, side, claims, why, lent)
 
 
 def _claims(
@@ -149,13 +152,13 @@ def _claims(
     shape: Array,
     room: tuple[Array, Array] | None,
     side: npt.NDArray[np.intp] | None,
-) -> tuple[npt.NDArray[np.intp] | None, Array | None, str]:
-    """Sides, the signed bounds (C, N, W, 4) on the chosen one, or why there is no way."""
+) -> tuple[npt.NDArray[np.intp] | None, Array | None, str, float]:
+    """Sides, the signed bounds (C, N, W, 4) on the chosen one, why there is no way, and what is lent [m]."""
     margin, cover, start = problem.margin, boxes.cover, boxes.start
     floor = min(margin, 0.0)  # a negative margin lets the curve into the box by as much
     deep = (start < floor - _TOUCH).all(axis=1)
     if deep.any():
-        return side, None, f"the ego starts inside obstacle {problem.occupancy.ids[int(deep.argmax())]}"
+        return side, None, f"the ego starts inside obstacle {problem.occupancy.ids[int(deep.argmax())]}", 0.0
     if side is None or room is None:
         # (N, W, 4); inf where nothing is asked
         slack = ((shape.swapaxes(0, 1)[..., SIDE_AXIS] * SIDE_SIGN)[:, None] - cover).min(axis=0)
@@ -168,15 +171,17 @@ def _claims(
         side = _choose(problem, slack - margin, start)
     needed = boxes.asked & ~beside
     keep: Array | float = margin
+    lent = 0.0
     # Who starts nearer than the margin keeps the distance it has.
     own = start[np.arange(len(start)), side[:, 0]]
     near = needed[:, 0] & (own >= floor - _TOUCH) & (own < margin)
     if near.any():
         keep = np.full(start.shape, margin)
         keep[near, side[near, 0]] = np.maximum(own[near], floor)
+        lent = margin - float(keep.min())
         keep = keep[:, None]
     mine = (side[..., None] == _SIDES) & needed[..., None]
-    return side, np.where(mine, cover + keep, -np.inf), ""
+    return side, np.where(mine, cover + keep, -np.inf), "", lent
 
 
 def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[np.intp]:

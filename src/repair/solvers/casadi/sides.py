@@ -97,8 +97,9 @@ def open_sides(instance: Instance, points: Array) -> Opening:
             why = why or "no curve from the start state keeps the limits and the road"
             return Opening(separation, points, why, closest)
         points = instance.on_path(model.with_unknowns(points, elastic[0]))
-        if closest is None or elastic[1] < closest[1]["obstacles"]:
-            closest = points, residuals_of(instance, separation, points) | {"obstacles": float(elastic[1])}
+        miss = float(elastic[1]) + separation.lent  # of the margin, not of what is asked of who starts nearer
+        if closest is None or miss < closest[1]["obstacles"]:
+            closest = points, residuals_of(instance, separation, points) | {"obstacles": miss}
         why = why or _missed(instance, separation, points, elastic[1])
         shape = instance.shape(points)
         room = instance.room(shape)

@@ -1,0 +1,25 @@
+"""What a hard backend says of the curve that comes closest holds of that curve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests import toy
+from tests.contract import problems
+
+from repair.solvers.casadi.backend import CasadiBackend
+from repair.solvers.casadi.settings import CasadiConfig
+
+
+@pytest.mark.parametrize("start", [0.02, 0.05, 0.09, 0.15])
+@pytest.mark.parametrize("slower", [3.0, 5.0])
+def test_the_miss_is_one_of_the_margin_also_for_who_starts_nearer(start, slower):
+    """A slower box right ahead, nearer than the margin at the start: braking comes too late by some metres."""
+    ahead = toy.box((start, start + 5.0), (-1.0, 1.0), (10.0 - slower, 0.0))
+    problem = problems.forced(toy.problem([ahead], lateral=False))
+    found = CasadiBackend(CasadiConfig(solver="sqpmethod")).solve(problem)
+    assert found.closest is not None
+    t = np.arange(0.0, 4.0, 1e-3)
+    nearest = (start + (10.0 - slower) * t - found.closest.curve.sample(t).position[:, 0]).min()
+    assert nearest >= problem.margin - found.closest.miss - 1e-6
+    assert nearest <= problem.margin - found.closest.miss + problem.margin  # and says no more than that
