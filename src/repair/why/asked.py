@@ -17,6 +17,8 @@ from repair.timegrid import INSTANT
 
 __all__ = ["REFERENCE", "Asked", "Cut", "Found"]
 
+_PROOF = 0.25  # processor time of a proof [s]: what takes longer mostly is none
+_CLOCK = 10.0  # times the processor time that is left, at most
 #: By whom a repair is found that is none: the reference itself meets nothing.
 REFERENCE = "reference"
 
@@ -101,7 +103,8 @@ class Asked:
             raise Cut
         if not self.proves or not self.t_rep < situation.conflict.time < math.inf:
             return None
-        return proof_at(situation, self.t_rep, situation.config.bound)
+        settings = replace(situation.config.bound, time_limit=_PROOF)
+        return proof_at(situation, self.t_rep, settings)
 
     def repair(self, situation: Prepared, *, proofs: bool = True) -> Found | None:
         """A repair at t_rep; None where a proof says that there is none, or nobody finds one.
@@ -143,7 +146,8 @@ class Asked:
         left = self.limit - self.spent
         if left <= 0.0:
             raise Cut
-        settings = replace(situation.config.search, time_limit=left, upper=None)
+        # A search may take long by the clock where others use the machine; it ends by itself.
+        settings = replace(situation.config.search, time_limit=_CLOCK * left, upper=None)
         found = search_with(backend, name, situation, settings, visits=(self.t_rep,))
         if found.status is SearchStatus.BUDGET_EXHAUSTED:
             raise Cut

@@ -38,7 +38,8 @@ class Kind:
     ----------
     name, unit : str
     step, most : float
-        To what the amount is found, and how much of it is tried; 0 where there is no amount.
+        To what the amount is found, and how much of it is tried; 0 where there is no amount, infinite where
+        it is half of the speed in the beginning.
     of_obstacle : bool
         Whether an obstacle is changed.
     monotone : bool

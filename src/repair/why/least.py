@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 
 from repair.preparation import Prepared
 from repair.why.asked import Asked, Cut, Found
 from repair.why.kinds import KINDS, Kind, under
 
-__all__ = ["Relaxation", "smallest"]
+__all__ = ["Relaxation", "bisected", "smallest"]
+
+_FINE = 0.08  # share of an amount to which it is found, where that is more than a step
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class _Trial:
         self.step = max(round(kind.step / dt), 1) * dt if kind.unit == "s" else kind.step
         most = kind.most
         if math.isinf(most):
-            most = max(float(prepared.scene.start[1, 0]) - self.step, 0.0)
+            most = max(0.5 * float(prepared.scene.start[1, 0]), 0.0)
         self.count = int(most / self.step + 1e-6) if self.step else 0
         self.known: dict[int, Found | None] = {0: None}
         self.proven = 0
@@ -78,13 +79,16 @@ class _Trial:
         return round(n * self.step, 9)
 
     def enough(self, n: int) -> bool:
+        """Whether so many steps suffice."""
+        if n <= self.proven:
+            return False
         if n not in self.known:
-            situation = under(self.prepared, self.kind.name, self.amount(n), self.index)
-            if self.kind.monotone and self.asked.proof(situation) is not None:
-                self.known[n], self.proven = None, max(self.proven, n)
-            else:
-                self.known[n] = self.asked.repair(situation, proofs=not self.kind.monotone)
+            self.known[n] = self.asked.repair(self.under(n), proofs=not self.kind.monotone)
         return self.known[n] is not None
+
+    def under(self, n: int) -> Prepared:
+        """The situation with so many steps."""
+        return under(self.prepared, self.kind.name, self.amount(n), self.index)
 
     def smallest(self) -> int | None:
         """The smallest number of steps that suffices, of which half do not; None where none does.
@@ -97,14 +101,15 @@ class _Trial:
             If the time is up and none is known.
         """
         try:
+            self._prove()
             low, high = self._enclosed()
             if high is None:
                 return None
             while True:
-                high = _bisected(low, high, self.enough)
+                high = bisected(low, high, self.enough, _FINE)
                 if not self.enough(high // 2):
                     return high
-                low, high = 0, high // 2
+                low, high = self.proven, high // 2
         except Cut:
             good = [n for n, found in self.known.items() if found is not None]
             if not good:
@@ -113,23 +118,25 @@ class _Trial:
 
     def half(self, n: int) -> float | None:
         """Half of a number of steps as an amount; None where nobody has looked."""
-        return self.amount(n // 2) if n // 2 in self.known else None
+        return self.amount(n // 2) if n // 2 in self.known or n // 2 <= self.proven else None
 
-    def prove(self, high: int) -> None:
-        """Find the largest number of steps below ``high`` that is proven to be too few."""
-        if not self.kind.monotone or self.asked.proof(self.prepared) is None:
+    def _prove(self) -> None:
+        """Find the largest number of steps that is proven to be too few: a proof takes less than a search."""
+        if not self.kind.monotone or not self.count or self.asked.proof(self.prepared) is None:
             return
 
         def open_(n: int) -> bool:
-            situation = under(self.prepared, self.kind.name, self.amount(n), self.index)
-            return self.asked.proof(situation) is None
+            return self.asked.proof(self.under(n)) is None
 
-        self.proven = _bisected(self.proven, high, open_) - 1
+        high = 1
+        while high <= self.count and not open_(high):
+            self.proven, high = high, 2 * high
+        self.proven = bisected(self.proven, min(high, self.count + 1), open_) - 1
 
     def _enclosed(self) -> tuple[int, int | None]:
         """Numbers of steps of which the first does not suffice and the second does."""
         if self.kind.monotone:
-            return 0, self.count if self.count and self.enough(self.count) else None
+            return self.proven, self.count if self.count and self.enough(self.count) else None
         low, high = 0, 1
         while high <= self.count:
             if self.enough(high):
@@ -138,8 +145,15 @@ class _Trial:
         return 0, None
 
 
-def _bisected(low: int, high: int, enough: Callable[[int], bool]) -> int:
-    while high - low > 1:
+def bisected(low: int, high: int, enough: Callable[[int], bool], share: float = 0.0) -> int:
+    """The first number that is enough; the gap to one that is not is 1, or at most a share of it.
+
+    Parameters
+    ----------
+    low, high : int
+        Not enough, and enough.
+    """
+    while high - low > max(1.0, share * high):
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle, high)
     return high
@@ -167,8 +181,6 @@ def smallest(prepared: Prepared, asked: Asked, name: str, index: int | None = No
             status = "sufficient" if found is not None else "not_sufficient"
             return Relaxation(name, status, who, index, by="" if found is None else found.by)
         n = trial.smallest()
-        with suppress(Cut):
-            trial.prove(trial.count + 1 if n is None else n)
     except Cut:
         return Relaxation(name, "cut", who, index)
     except ValueError as why:
