@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from repair.cli import certify, info, paper, run, scenarios, study, sweep
+from repair.cli import certify, info, paper, report, run, scenarios, study, sweep
 from repair.cli.arguments import UsageError, no_arguments
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
@@ -57,6 +57,7 @@ VERBS: tuple[Verb, ...] = (
         scenarios.scenarios,
     ),
     Verb("study", "repair many scenarios as a file says, resumable", study.study_arguments, study.study),
+    Verb("report", "one page of HTML about a study or a result", report.report_arguments, report.report),
     Verb("sweep", "repair all scenarios of a folder", sweep.sweep_arguments, sweep.sweep),
     Verb("table1", "the paper's Table I, paper and ours", paper.table1_arguments, paper.table1),
     Verb("table2", "the paper's Table II, times on this machine", paper.table2_arguments, paper.table2),

@@ -28,9 +28,7 @@ class _Remote:
     client: Any
 
     def give(self, task: Task) -> Future[Answer]:
-        executor = self.client.get_executor(
-            pure=False, workers=[self.name], allow_other_workers=True, key=f"repair-{task.key[:16]}"
-        )
+        executor = self.client.get_executor(pure=False, workers=[self.name], allow_other_workers=True)
         made: Future[Answer] = executor.submit(run_task, task)
         return made
 

@@ -1,0 +1,38 @@
+"""``repair report``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from repair.cli.arguments import UsageError
+
+__all__ = ["report", "report_arguments"]
+
+
+def report_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair report``."""
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR",
+        help="what `repair study`, `repair sweep --out` or `repair run --out` wrote",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", metavar="FILE.html", type=Path, help="where it is written (default: DIR/report.html)"
+    )
+
+
+def report(arguments: argparse.Namespace) -> int:
+    """One page of HTML with all rows and their pictures."""
+    from repair.io.files import write_files
+    from repair.study.shown import page_of_result, page_of_study
+    from repair.study.store import STORE_FILE
+
+    folder: Path = arguments.folder
+    target: Path = arguments.out or folder / "report.html"
+    if target.is_dir():
+        raise UsageError(f"the report {target} is a folder; the name of a file is wanted")
+    made: Any = page_of_study if (folder / STORE_FILE).is_file() else page_of_result
+    content = made(folder).encode("utf-8", "backslashreplace")
+    print(*write_files(target.parent, {target.name: content}))
+    return 0

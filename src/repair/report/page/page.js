@@ -1,0 +1,246 @@
+"use strict";
+(function () {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const by = (id) => document.getElementById(id);
+  const look = { responsive: true, displayModeBar: false };
+  const base = {
+    margin: { l: 52, r: 12, t: 12, b: 44 }, paper_bgcolor: "white", plot_bgcolor: "white", hovermode: "closest",
+    legend: { orientation: "h", y: -0.34 }, font: { size: 12 },
+  };
+  const axis = (title, more) => Object.assign({ title: { text: title }, gridcolor: "#eee", zerolinecolor: "#ccc" }, more);
+
+  // -- of all rows ----------------------------------------------------------------------------------
+  for (const figure of data.figures) {
+    Plotly.newPlot(by("figure-" + figure.id), figure.data, Object.assign({}, base, figure.layout), look);
+  }
+
+  const table = by("rows"), head = table.tHead, body = table.tBodies[0];
+  const shown = (value) => value === null || value === undefined ? "" :
+    typeof value === "number" ? String(Math.round(value * 1e5) / 1e5) : String(value);
+  const texts = data.rows.map((row) => row.map(shown));
+  const found = texts.map((row) => row.join(" ").toLowerCase());
+  let order = data.rows.map((_, k) => k), sorted = null, down = false;
+
+  const line = head.insertRow();
+  data.columns.forEach((name, column) => {
+    const cell = document.createElement("th");
+    cell.textContent = name;
+    cell.scope = "col";
+    cell.tabIndex = 0;
+    const sort = () => {
+      down = sorted === column ? !down : false;
+      sorted = column;
+      const value = (k) => data.rows[k][column];
+      order.sort((a, b) => {
+        const x = value(a), y = value(b);
+        if (x === null || x === "" || y === null || y === "") {
+          return (x === null || x === "") - (y === null || y === "") || a - b; // what is not there comes last
+        }
+        const less = typeof x === "number" && typeof y === "number" ? x - y : String(x).localeCompare(String(y));
+        return (down ? -less : less) || a - b;
+      });
+      for (const other of line.cells) other.removeAttribute("aria-sort");
+      cell.setAttribute("aria-sort", down ? "descending" : "ascending");
+      fill();
+    };
+    cell.addEventListener("click", sort);
+    cell.addEventListener("keydown", (event) => { if (event.key === "Enter") sort(); });
+    line.append(cell);
+  });
+
+  const lines = texts.map((row, k) => {
+    const made = document.createElement("tr");
+    for (const text of row) {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      made.append(cell);
+    }
+    made.addEventListener("click", () => choose(k, true));
+    return made;
+  });
+
+  function fill() {
+    const words = by("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
+    const kept = order.filter((k) => words.every((word) => found[k].includes(word)));
+    body.replaceChildren(...kept.map((k) => lines[k]));
+    by("count").textContent = kept.length + " of " + order.length + " rows";
+  }
+  by("filter").addEventListener("input", fill);
+  fill();
+
+  // -- of one row -----------------------------------------------------------------------------------
+  async function opened(text) {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return JSON.parse(await new Response(stream).text());
+  }
+
+  let one = null, road = null, lastChosen = 0;
+
+  async function choose(k, scroll) {
+    const turn = ++lastChosen;
+    lines.forEach((row, j) => row.classList.toggle("chosen", j === k));
+    by("detail").hidden = false;
+    by("detail-title").textContent = data.names[k];
+    if (data.details[k] === null) {
+      one = null;
+      by("detail-sentence").textContent = "The result of this row was not kept.";
+      return;
+    }
+    const detail = await opened(data.details[k]);
+    const around = data.cases[data.names[k]] ? await opened(data.cases[data.names[k]]) : null;
+    if (turn !== lastChosen) return; // another one was chosen meanwhile
+    one = detail;
+    road = around;
+    by("detail-sentence").textContent = one.sentence;
+    by("notes").replaceChildren(...one.notes.map((note) => {
+      const item = document.createElement("li");
+      item.textContent = note;
+      return item;
+    }));
+    by("probes").tBodies[0].replaceChildren(...one.probes.map((probe) => {
+      const row = document.createElement("tr");
+      for (const text of [probe.t.toFixed(2), probe.by, probe.ok ? "feasible" : "rejected", probe.words, probe.why]) {
+        row.insertCell().textContent = text;
+      }
+      return row;
+    }));
+    one.repairs = one.lines.filter((each) => each.kind === "repair").sort((a, b) => a.t_rep - b.t_rep);
+    const best = one.repairs.findLastIndex((each) => one.f_ttr !== null && Math.abs(each.t_rep - one.f_ttr) < 1e-6);
+    const slider = by("slider");
+    slider.max = Math.max(one.repairs.length - 1, 0);
+    slider.value = best < 0 ? 0 : best;
+    slider.disabled = one.repairs.length < 2;
+    draw();
+    if (scroll) by("detail").scrollIntoView({ behavior: "smooth", block: "start" });
+  }
+
+  function verdictOf(line) {
+    const probes = one.probes.filter((each) => Math.abs(each.t - line.t_rep) < 1e-6);
+    return probes.find((each) => each.ok) || probes[0];
+  }
+
+  function draw() {
+    const reference = one.lines.find((each) => each.kind === "reference");
+    if (!reference) {
+      by("slider-words").textContent = "";
+      by("probe-why").textContent = "Nothing was drawn of this row.";
+      return;
+    }
+    const chosen = one.repairs[Number(by("slider").value)];
+    const probe = chosen ? verdictOf(chosen) : null;
+    by("slider-words").textContent = chosen ?
+      chosen.t_rep.toFixed(2) + " s: " + (probe && probe.ok ? "feasible" : "rejected") : "no repair was drawn";
+    by("probe-why").textContent = probe ? probe.words + (probe.ok || !probe.why ? "" : ". " + probe.why) : "";
+    const good = !probe || probe.ok, colour = good ? "#0072b2" : "#d55e00";
+    const after = chosen && Math.abs(chosen.t_rep - one.f_ttr) < 1e-6 && good ?
+      one.lines.filter((each) => each.kind === "continuation" || each.kind === "onward") : [];
+    const name = chosen ? (good ? "repair" : "rejected") + ", " + chosen.t_rep.toFixed(2) + " s" : "";
+
+    function curves(column, more) {
+      const made = one.repairs.filter((each) => each !== chosen).map((each) => ({
+        x: each.t, y: each[column], mode: "lines", line: { color: "#c8c8c8", width: 1 }, showlegend: false,
+        hovertemplate: "t_rep " + each.t_rep.toFixed(2) + " s<extra></extra>",
+      }));
+      made.push({ x: reference.t, y: reference[column], mode: "lines", name: "reference",
+        line: { color: "#555", dash: "dash", width: 1.5 } });
+      if (chosen) made.push({ x: chosen.t, y: chosen[column], mode: "lines", name: name, line: { color: colour, width: 2.5 } });
+      for (const each of after) {
+        made.push({ x: each.t, y: each[column], mode: "lines", name: each.kind === "onward" ? "onward" : "stop after it",
+          line: { color: colour, width: 1.5, dash: "dot" } });
+      }
+      return made.concat(more || []);
+    }
+    const limit = (value, text) => value === null || value === undefined ? [] : [{
+      x: [0, one.until], y: [value, value], mode: "lines", name: text, line: { color: "#b00020", width: 1, dash: "dashdot" },
+    }];
+    const moments = [];
+    if (one.ttc !== null) moments.push([one.ttc, "TTC"]);
+    if (chosen) moments.push([chosen.t_rep, "t_rep"]);
+    const shapes = moments.map(([t]) => ({ type: "line", x0: t, x1: t, y0: 0, y1: 1, yref: "paper",
+      line: { color: "#888", width: 1, dash: "dot" } }));
+    const labels = moments.map(([t, text], k) => ({ x: t, y: 1, yref: "paper", yanchor: "top", xanchor: k ? "right" : "left",
+      text: text, showarrow: false, font: { size: 11, color: "#555" } }));
+    const time = axis("t [s]");
+    const panel = (id, title, traces, more) => Plotly.react(by(id), traces, Object.assign({}, base,
+      { xaxis: time, yaxis: axis(title, more), shapes: shapes, annotations: labels }), look);
+
+    // Distance: the ego's own length, and the others without the margin.
+    const half = one.length / 2, others = [];
+    for (const box of road ? road.boxes : []) {
+      box.runs.forEach((run) => others.push({
+        x: run[0].concat(run[0].slice().reverse()), y: run[1].concat(run[2].slice().reverse()), fill: "toself",
+        mode: "lines", line: { color: "#444", width: 1 }, fillcolor: "rgba(60,60,60,0.55)", showlegend: false,
+        hoverinfo: "text", text: "obstacle " + box.id,
+      }));
+    }
+    const on = chosen || reference;
+    const band = { x: on.t.concat(on.t.slice().reverse()),
+      y: on.s.map((s) => s + half).concat(on.s.map((s) => s - half).reverse()), fill: "toself", mode: "none",
+      fillcolor: chosen ? (good ? "rgba(0,114,178,0.22)" : "rgba(213,94,0,0.22)") : "rgba(90,90,90,0.2)", name: "the ego's length", hoverinfo: "skip" };
+    const aside = on.s.map((s, k) => Math.abs(on.beside[k]) > one.width / 2 ? s : null);
+    const beside = { x: on.t, y: aside, mode: "markers", marker: { symbol: "circle-open", size: 7, color: colour },
+      name: "more than half its width beside the reference: see the next figure", hoverinfo: "skip" };
+    const seen = one.lines.filter((each) => each.kind !== "continuation" && each.kind !== "onward").flatMap((each) => each.s);
+    const low = Math.min(...seen) - half, high = Math.max(...seen) + half, room = 0.06 * (high - low) + 1;
+    panel("plot-s", "s [m]", others.concat([band], curves("s"), aside.some((s) => s !== null) ? [beside] : []),
+      { range: [low - room, high + room] });
+    panel("plot-l", "l [m], left is positive", curves("l"));
+    panel("plot-v", "v [m/s]", curves("v", limit(one.limits.v_max, "largest speed")), speedRange());
+    panel("plot-a", "a [m/s²]", curves("a", limit(one.limits.a_min, "smallest").concat(limit(one.limits.a_max, "largest"))));
+    panel("plot-across", "a [m/s²], left is positive",
+      curves("across", limit(one.limits.a_lat, "largest").concat(limit(-one.limits.a_lat, "to the other side"))));
+
+    function speedRange() { // a limit that is far away would press everything else flat
+      const speeds = one.lines.flatMap((each) => each.v), top = Math.max(...speeds, 1);
+      return { range: [Math.min(...speeds, 0) - 0.05 * top, top * 1.15] };
+    }
+
+    const turn = Array.from({ length: 73 }, (_, k) => k * Math.PI / 36), radius = one.limits.a_total;
+    Plotly.react(by("plot-circle"), [
+      { x: turn.map((w) => radius * Math.cos(w)), y: turn.map((w) => radius * Math.sin(w)), mode: "lines", name: "limit",
+        line: { color: "#b00020", width: 1, dash: "dashdot" }, hoverinfo: "skip" },
+      { x: reference.across, y: reference.a, mode: "lines", name: "reference", line: { color: "#555", dash: "dash", width: 1 } },
+    ].concat(chosen ? [{ x: chosen.across, y: chosen.a, mode: "lines+markers", name: name, marker: { size: 4, color: colour },
+      line: { color: colour, width: 1.5 } }] : []), Object.assign({}, base, {
+      xaxis: axis("across [m/s²]"), yaxis: axis("along [m/s²]", { scaleanchor: "x" }) }), look);
+    birdseye(reference, chosen, after, name, colour);
+  }
+
+  function birdseye(reference, chosen, after, name, colour) {
+    const traces = [];
+    const filled = (xy, fill, edge, text, legend) => ({ x: xy[0], y: xy[1], mode: "lines", fill: "toself", fillcolor: fill,
+      line: { color: edge, width: 1 }, hoverinfo: text ? "text" : "skip", text: text, showlegend: Boolean(legend), name: legend });
+    for (const area of road ? road.areas : []) traces.push(filled(area, "#eceff1", "#b0bec5"));
+    const step = road ? road.steps[0] : 0;
+    for (const body of road ? road.bodies : []) {
+      if (body.path[0].length > 1) traces.push({ x: body.path[0], y: body.path[1], mode: "lines", line: { color: "#bbb", width: 1 },
+        showlegend: false, hoverinfo: "skip" });
+      const at = body.shapes[String(step)];
+      if (at) traces.push(filled(at, "rgba(60,60,60,0.6)", "#333", "obstacle " + body.id));
+    }
+    traces.push({ x: reference.x, y: reference.y, mode: "lines", name: "reference", line: { color: "#555", dash: "dash" } });
+    if (chosen) traces.push({ x: chosen.x, y: chosen.y, mode: "lines", name: name, line: { color: colour, width: 3 } });
+    for (const each of after) traces.push({ x: each.x, y: each.y, mode: "lines", name: "after it", line: { color: colour, dash: "dot" } });
+    const on = chosen || reference, at = step * one.dt;
+    let k = 0;
+    on.t.forEach((t, j) => { if (Math.abs(t - at) < Math.abs(on.t[k] - at)) k = j; });
+    const next = Math.min(k + 1, on.t.length - 1), before = Math.max(next - 1, 0);
+    let w = Math.atan2(on.y[next] - on.y[before], on.x[next] - on.x[before]);
+    if (one.ego && one.ego.length && (!chosen || Math.abs(chosen.t_rep - one.f_ttr) < 1e-6)) {
+      w = one.ego.reduce((a, b) => Math.abs(b[3] - step) < Math.abs(a[3] - step) ? b : a)[2]; // of who stands, too
+    }
+    const corners = [[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]].map(([a, b]) => [a * one.length / 2, b * one.width / 2]);
+    traces.push(filled([corners.map(([a, b]) => on.x[k] + a * Math.cos(w) - b * Math.sin(w)),
+      corners.map(([a, b]) => on.y[k] + a * Math.sin(w) + b * Math.cos(w))], "rgba(0,114,178,0.5)", colour, "the ego",
+      "the ego, all at " + on.t[k].toFixed(1) + " s"));
+    const xs = one.lines.flatMap((each) => each.x), ys = one.lines.flatMap((each) => each.y);
+    Plotly.react(by("plot-bird"), traces, Object.assign({}, base, {
+      xaxis: axis("x [m]", { range: [Math.min(...xs) - 8, Math.max(...xs) + 8] }),
+      yaxis: axis("y [m]", { range: [Math.min(...ys) - 8, Math.max(...ys) + 8], scaleanchor: "x" }) }), look);
+  }
+
+  by("slider").addEventListener("input", () => { if (one) draw(); });
+  const first = data.details.findIndex((each) => each !== null);
+  if (first >= 0) choose(first, false);
+})();
