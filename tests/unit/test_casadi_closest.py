@@ -14,7 +14,7 @@ from repair.solvers.casadi.settings import CasadiConfig
 @pytest.mark.parametrize("start", [0.02, 0.05, 0.09, 0.15])
 @pytest.mark.parametrize("slower", [3.0, 5.0])
 def test_the_miss_is_one_of_the_margin_also_for_who_starts_nearer(start, slower):
-    """A slower box right ahead, nearer than the margin at the start: braking comes too late by some metres."""
+    """A slower box right ahead, nearer than the margin at the start: braking comes too late."""
     ahead = toy.box((start, start + 5.0), (-1.0, 1.0), (10.0 - slower, 0.0))
     problem = problems.forced(toy.problem([ahead], lateral=False))
     found = CasadiBackend(CasadiConfig(solver="sqpmethod")).solve(problem)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _PLACE, _ORIENTATION = 0.02, 0.03  # the drivability checker's tolerances [m], [rad]
 _PARTS = 20  # of a step, in which the model is integrated
+# Steering angle [rad] and speed [m/s] at the end of a step beside the next state's, within its tolerances.
+_ELSEWHERE = [(beyond, faster) for beyond in np.linspace(-0.03, 0.03, 13) for faster in (0.0, -0.03, 0.03)]
 
 __all__ = ["driven_rows", "physical_rows", "weakened"]
 
@@ -96,21 +98,30 @@ def physical_rows(states: States, dt: float, vehicle: Vehicle) -> list[Certifica
 
 
 def _missed(states: States, dt: float, vehicle: Vehicle) -> tuple[float, float]:
-    """By how much the next states are missed, the steering rate cut off: place [m], orientation [rad]."""
+    """By how much the next states are missed, the steering rate cut off: place [m], orientation [rad].
+
+    A step may end with another steering angle and speed than the next state's, by as much as the drivability
+    checker allows: that counts which misses the least, as there, where inputs are optimised.
+    """
     psi = np.unwrap(states.orientation)
     axle = states.xy - vehicle.rear * np.stack([np.cos(psi), np.sin(psi)], axis=1)
     v, delta = states.speed, states.steering
-    reach = vehicle.steering_rate_max * dt
-    change, gained = np.clip(np.diff(delta), -reach, reach), np.diff(v)
-    here, body, share = axle[:-1].copy(), psi[:-1].copy(), 1.0 / _PARTS
-    for i in range(_PARTS):
-        middle = (i + 0.5) * share
-        way = (v[:-1] + middle * gained) * dt * share
-        turn = way * np.tan(delta[:-1] + middle * change) / vehicle.wheelbase
-        here += way[:, None] * np.stack([np.cos(body + 0.5 * turn), np.sin(body + 0.5 * turn)], axis=1)
-        body += turn
-    off = np.abs(here - axle[1:])
-    return float(off.max(initial=0.0)), float(np.abs(body - psi[1:]).max(initial=0.0))
+    reach, share = vehicle.steering_rate_max * dt, 1.0 / _PARTS
+    best = np.full((2, max(len(v) - 1, 0)), np.inf)
+    for beyond, faster in _ELSEWHERE:
+        change, gained = np.clip(np.diff(delta) + beyond, -reach, reach), np.diff(v) + faster
+        here, body = axle[:-1].copy(), psi[:-1].copy()
+        for i in range(_PARTS):
+            middle = (i + 0.5) * share
+            way = (v[:-1] + middle * gained) * dt * share
+            turn = way * np.tan(delta[:-1] + middle * change) / vehicle.wheelbase
+            here += way[:, None] * np.stack([np.cos(body + 0.5 * turn), np.sin(body + 0.5 * turn)], axis=1)
+            body += turn
+        missed = np.array((np.abs(here - axle[1:]).max(axis=1), np.abs(body - psi[1:])))
+        allowed = np.array([[_PLACE], [_ORIENTATION]])
+        nearer = (missed / allowed).max(axis=0) < (best / allowed).max(axis=0)
+        best[:, nearer] = missed[:, nearer]
+    return float(best[0].max(initial=0.0)), float(best[1].max(initial=0.0))
 
 
 def weakened(limits: Limits, usual: Limits) -> list[str]:
