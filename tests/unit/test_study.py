@@ -8,12 +8,14 @@ import itertools
 import json
 import os
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
 import time
 from collections import Counter
 from concurrent.futures import Future
+from contextlib import ExitStack
 from dataclasses import replace
 
 import pytest
@@ -415,3 +417,56 @@ def test_killed_five_times_and_interrupted_twice(folder, tmp_path, study):
         study,
         [signal.SIGKILL] * 3 + [signal.SIGINT] + [signal.SIGKILL] * 2 + [signal.SIGINT],
     )
+
+
+# -- a cluster -------------------------------------------------------------------------------------
+
+
+def test_a_cluster_that_is_not_there(folder, tmp_path, capsys, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("repair.study.cluster._FOUND", 0.2)
+    argv = ["study", str(written(tmp_path, f"scenarios: {folder}\n")), "--out", str(tmp_path / "out")]
+    assert main([*argv, "--dask", "tcp://127.0.0.1:9"]) == 2
+    assert "no Dask cluster can be used at tcp://127.0.0.1:9" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main([*argv, "--dask", "tcp://127.0.0.1:9", "--workers", "2"]) == 2
+
+
+@pytest.mark.exhaustive
+def test_a_cluster_that_loses_a_worker_gives_the_same_table(folder, tmp_path):
+    pytest.importorskip("distributed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    file = written(
+        tmp_path,
+        f"scenarios: {folder}\nbackends: [ego, qptr]\nreferences: constant\nofficial: false\n"
+        "set: {fallback: []}\nvary: {search.delta_t: [0.4, 0.2]}\n",
+    )
+    start = [sys.executable, "-W", "ignore", "-m"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    port = address.rpartition(":")[2]
+    with ExitStack() as ended:
+
+        def run(*argv):
+            process = subprocess.Popen([*start, *argv], **quiet)
+            ended.callback(process.wait)
+            ended.callback(process.kill)
+            return process
+
+        run("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+        worker = ["distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        run(*worker)
+        lost = run(*worker)
+        out = tmp_path / "out"
+        for _ in range(6):  # until scheduler and worker are there
+            study = run("repair", "study", str(file), "--out", str(out), "--resume", "--dask", address)
+            while there(out) < 4 and study.poll() is None:
+                time.sleep(0.02)
+            if there(out):
+                break
+        lost.kill()
+        assert study.wait(300) == 0
+    whole = tmp_path / "whole"
+    assert main(["study", str(file), "--out", str(whole)]) == 0
+    assert table(out) == table(whole)

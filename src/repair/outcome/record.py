@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -167,6 +168,7 @@ def _beyond(beyond: Beyond | None) -> dict[str, Any] | None:
     }
 
 
+@cache  # looking it up in the file system takes longer than the rest of a record
 def _version(name: str) -> str | None:
     try:
         return version(name)
