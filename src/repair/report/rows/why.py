@@ -103,7 +103,8 @@ def _helping(relaxations: list[dict[str, Any]]) -> list[str]:
 
 def _less(one: dict[str, Any]) -> str:
     """With how much less there is none."""
-    text = f"not with {one['not_with']:g}" if one["not_with"] is not None else "less was not tried"
+    half = one["not_with"]
+    text = "less was not tried" if half is None else f"not with {half:g}" if half else "not without"
     if one["proven_too_little"]:
         text += f"; proven: not with {one['proven_too_little']:g}"
     return text
