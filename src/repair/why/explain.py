@@ -22,7 +22,7 @@ __all__ = ["Explanation", "explain", "explained_time"]
 
 _ORACLE = "shooting"
 _SET = 0.4  # share of the time that the set of obstacles may take
-_EACH = 2.0  # times the time that is left for each kind, as long as others take less
+_EACH = 1.25  # times its share of the time that is left for each kind
 _CHANGED = 3  # obstacles that are changed, at most
 
 
