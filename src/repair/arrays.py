@@ -74,4 +74,5 @@ def in_seconds(value: float | None) -> str:
 
 def column(values: Any, digits: int = 9) -> list[float | None]:
     """Finite plain floats, None for each that is not."""
-    return [number(v, digits) for v in np.asarray(values, dtype=np.float64).tolist()]
+    plain = np.asarray(values, dtype=np.float64).tolist()
+    return [round(v, digits) + 0.0 if math.isfinite(v) else None for v in plain]

@@ -258,7 +258,7 @@ class Here:
     """Lanes that need no process; each answers at once."""
 
     def __init__(self, *names):
-        self.names, self.seen, self.closed = names, [], False
+        self.names, self.seen, self.closed, self.memory, self.replaced = names, [], False, 100.0, []
 
     def now(self):
         return [self.Lane(name, self) for name in self.names]
@@ -267,19 +267,23 @@ class Here:
         self.closed = True
 
     class Lane:
+        most = 280.0
+
         def __init__(self, name, all_of_them):
             self.name, self.all = name, all_of_them
 
         def give(self, task):
             self.all.seen.append((self.name, task.file))
             answer = Future()
-            answer.set_result((strict(failed_row(task.file, task.backend, "constant", "found", "")), None))
+            row = strict(failed_row(task.file, task.backend, "constant", "found", ""))
+            answer.set_result((row | {"worker_peak_memory_mb": self.all.memory}, None))
             return answer
 
         def ready(self):
             return True
 
         def replace(self):
+            self.all.replaced.append(len(self.all.seen))
             return True
 
 
@@ -291,6 +295,16 @@ def test_a_lane_keeps_to_a_scenario(study):
     turns = [[file for name, file in lanes.seen if name == lane] for lane in ("one", "two")]
     assert all(sum(a != b for a, b in itertools.pairwise(t)) <= 2 for t in turns)
     assert abs(len(turns[0]) - len(turns[1])) <= 1  # who has nothing left helps
+
+
+def test_a_process_that_has_grown_is_replaced_between_scenarios(study):
+    tasks, lanes = tasks_of(study), Here("one")
+    assert len(list(rows_of(tasks, lanes))) == 12
+    assert lanes.replaced == []
+    lanes.memory = 300.0
+    lanes.seen.clear()
+    assert len(list(rows_of(tasks, lanes))) == 12
+    assert lanes.replaced == [4, 8, 12]
 
 
 def test_only_what_is_missing_is_made(study, tmp_path, capsys):

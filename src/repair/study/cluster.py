@@ -26,6 +26,7 @@ class _Remote:
 
     name: str
     client: Any
+    most: float = float("inf")  # whoever started it says what it may take
 
     def give(self, task: Task) -> Future[Answer]:
         executor = self.client.get_executor(pure=False, workers=[self.name], allow_other_workers=True)

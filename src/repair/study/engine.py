@@ -24,6 +24,7 @@ from repair.study.worker import TOO_MUCH_MEMORY, Answer, begin, run_task, starte
 __all__ = ["Lane", "Lanes", "LocalLanes", "rows_of"]
 
 _GRACE = 2.0  # a process ends itself when a row takes too long; after this much more it is ended [s]
+_MOST = 280.0  # a process that has taken so much makes room for a new one, between two scenarios [MB]
 _LOOKS = 0.1  # how often it is looked at the clock [s]
 
 
@@ -31,9 +32,13 @@ Work = Callable[[Task], Answer]
 
 
 class Lane(Protocol):
-    """One process that can be given tasks, and be replaced."""
+    """One process that can be given tasks, and be replaced.
+
+    Where it has taken ``most`` MB it is replaced before the next scenario.
+    """
 
     name: str
+    most: float
 
     def give(self, task: Task) -> Future[Answer]:
         """Have a task done; the process is started if need be."""
@@ -66,6 +71,7 @@ class _Local:
 
     name: str
     work: Work
+    most: float = _MOST
     executor: Any = None
     hello: Future[str] | None = None
 
@@ -159,9 +165,9 @@ class _Queues:
         longest = max(self.taken.values(), key=len, default=None)
         return longest.pop() if longest else None
 
-    def back(self, task: Task) -> None:
-        """A task that has to be done by somebody else."""
-        self.waiting.append(deque([task]))
+    def turns(self, name: str) -> bool:
+        """Whether a lane has nothing left of its scenario."""
+        return not self.taken.get(name)
 
     def __bool__(self) -> bool:
         return any(self.waiting) or any(self.taken.values())
@@ -197,7 +203,13 @@ def rows_of(
             ended = [each for each in busy.values() if each.future.done() or each.late(time.monotonic())]
             for each in ended:
                 del busy[each.lane.name]
-                yield each.task, _answer(each)
+                answer = _answer(each)
+                # What scenarios leave behind (models, caches, holes in the heap) adds up.
+                if (answer[0]["worker_peak_memory_mb"] or 0.0) > each.lane.most and queues.turns(
+                    each.lane.name
+                ):
+                    each.lane.replace()
+                yield each.task, answer
             if not ended:
                 idle()
     finally:
