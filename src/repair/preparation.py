@@ -31,6 +31,7 @@ from repair.reference.registry import (
     track_along,
 )
 from repair.scene.reframe import as_ego, reframe
+from repair.scene.road.sections import endless
 from repair.scene.scene import Scene
 from repair.scene.settings import LOADING, SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
@@ -319,7 +320,13 @@ def _bridged(checker: Checker, places: Array) -> list[str]:
     import shapely
 
     driven = shapely.LineString(checker.scene.frame.to_cartesian(*places.T))
-    return [str(one) for one in checker.road.bridged(driven.buffer(checker.scene.vehicle.half_width))]
+    found = [str(one) for one in checker.road.bridged(driven.buffer(checker.scene.vehicle.half_width))]
+    if endless(checker.scene.scenario.lanelet_network):
+        found.append(
+            "lanelets of this map are each other's neighbours in a ring: it has no lane sections, and "
+            "CommonRoad's own boundary check is not asked"
+        )
+    return found
 
 
 def _remarks(config: Config, wanted: float, t_reference: float) -> list[str]:

@@ -111,10 +111,10 @@ class Judge:
 
         if result.status.value not in ("found", "no_conflict"):
             return False
-        before = len(self.found.deviations)
+        before = sum(not one.told for one in self.found.deviations)
 
-        def says(kind: str, reason: str) -> None:
-            self.found.says(kind, reason, backend, reference)
+        def says(kind: str, reason: str, *, told: bool = False) -> None:
+            self.found.says(kind, reason, backend, reference, told=told)
 
         with tempfile.TemporaryDirectory() as folder:
             files = [f for f in result.save(folder, figure=False) if f.name.startswith("solution_")]
@@ -123,9 +123,9 @@ class Judge:
             scene = result.prepared.scene
             official = check_solution_file(files[0], scene.official(), problems)
         self.found.counts["official checks"] += 1
-        for name in ("feasible", "collision_free", "on_road"):
+        for name in ("feasible", "collision_free"):
             if not getattr(official, name):
-                says("official", f"not {name}" + f" ({official.road_method})" * (name == "on_road"))
+                says("official", f"not {name}")
         try:
             solution_checker.starts_at_correct_state(solution, problems)
         except Exception as error:
@@ -141,7 +141,10 @@ class Judge:
             far = self.road.beyond(_until(ego, np.inf, every=20)).max(initial=0.0)
             if far > ROAD + result.prepared.config.checker.road_gap:
                 says("off_road", f"the trajectory is {far:.2f} m off the lanelets")
-        return len(self.found.deviations) == before
+            elif not official.on_road:  # a gap of the map, or one that the drivability checker cannot lay out
+                how = f"{official.road_method}; {far:.2f} m off the lanelets"
+                says("boundary", f"CommonRoad's own boundary check says no ({how})", told=True)
+        return sum(not one.told for one in self.found.deviations) == before
 
 
 def _is_own(obstacle: Any, problem: Any, first: int) -> bool:

@@ -11,6 +11,7 @@ import shapely
 from repair.certify.limits import physical_rows
 from repair.certify.motion import States
 from repair.check.limits import vehicle_excess
+from repair.scene.road.sections import endless
 from repair.vehicle.parameters import load_vehicle
 from repair.world.road import RoadBoundary
 
@@ -73,3 +74,20 @@ def test_who_crosses_a_gap_that_counts_as_road_is_told(wide):
     assert "crosses a gap of the map at (30.0, " in words
     assert road.first_off_road(x, across, np.zeros(2)) is None
     assert boundary([lanelet(1, 3.5, 0.0)], 0.0).over_a_gap(x, across, np.zeros(2)) is None
+
+
+def test_neighbours_that_lead_back_are_noticed():
+    def linked(name, left, right, same=True):
+        return SimpleNamespace(
+            lanelet_id=name, adj_left=left, adj_right=right, adj_left_same_direction=same,
+            adj_right_same_direction=same,
+        )  # fmt: skip
+
+    def network(*lanelets):
+        return SimpleNamespace(lanelets=lanelets)
+
+    assert not endless(network(linked(1, 2, None), linked(2, 3, 1), linked(3, None, 2)))
+    assert not endless(network(linked(1, 2, None, False), linked(2, 1, None, False)))  # one beside the other
+    assert not endless(network(linked(1, 9, None)))  # who is not on the map
+    assert endless(network(linked(1, 2, None), linked(2, 1, None)))
+    assert endless(network(linked(1, None, 3), linked(2, 3, 1), linked(3, 1, 2)))

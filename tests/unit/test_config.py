@@ -485,10 +485,10 @@ def test_what_a_file_sets_for_another_source_may_stand_there(tmp_path):
             ["driver=at_ttr", "search.rule=scan", "search.upper=1", "search.time_limit=1"],
             [("search.rule", "driver", "at_ttr"), ("search.upper", "driver", "at_ttr")],
         ),
-        (["casadi.rounds=3"], [("casadi.rounds", "backend", "ego")]),
+        (["casadi.rounds=3", "fallback=[]"], [("casadi.rounds", "backend", "ego")]),
         (["backend=casadi", "casadi.rounds=3"], []),
         (["backend=casadi", "ego.deform.smooth=3"], []),  # ego helps
-        (["backend=casadi", "qptr.spacing=0.5"], [("qptr.spacing", "backend", "casadi")]),
+        (["backend=shooting", "qptr.spacing=0.5"], [("qptr.spacing", "backend", "shooting")]),
         (["backend=qptr", "ego.deform.smooth=3"], []),  # it may have to find what qptr does not
         (["backend=qptr", "ego.deform.smooth=3", "fallback=[]"], [("ego.deform.smooth", "backend", "qptr")]),
         (["ego.precondition=false"], [("ego.precondition", "ego.solver", "newton")]),

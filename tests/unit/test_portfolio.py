@@ -245,7 +245,8 @@ def test_settings_of_those_who_may_be_asked_have_an_effect():
     def idle(*overrides, backend="qptr"):
         return {key for key, *_ in load_config(backend=backend, overrides=list(overrides)).without_effect()}
 
-    assert idle("shooting.seed=1", "casadi.solver=sqpmethod") == {"casadi.solver"}
+    assert idle("shooting.seed=1", "casadi.solver=sqpmethod") == set()
+    assert idle("shooting.seed=1", "casadi.solver=sqpmethod", "fallback=[shooting]") == {"casadi.solver"}
     assert idle("shooting.seed=1", "fallback=[]") == {"shooting.seed"}
     assert idle("casadi.solver=sqpmethod", "fallback=[portfolio]") == set()
     assert idle("qptr.solver=osqp", "shooting.seed=1", "fallback=[]", backend="portfolio") == set()

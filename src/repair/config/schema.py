@@ -45,7 +45,7 @@ class Config:
     fallback: list[str] | None = setting(
         None,
         "backends that are asked, in this order, where the search ends without a repair; the result says "
-        "whose it is; null: for ego shooting, for casadi and qptr ego and then shooting, for others none",
+        "whose it is; null: for ego, qptr and casadi each other and shooting, the cheap ones first",
         registry="backend",
         only_with=("driver", ("f_ttr",)),
     )

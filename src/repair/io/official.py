@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from repair.io.plotting import import_matplotlib
+from repair.scene.road.sections import endless
 
 __all__ = ["OfficialVerdict", "check_solution_file"]
 
@@ -153,6 +154,8 @@ def _connected(states: Any, dt: float) -> bool:
 def _on_road(solution: Any, scenario: Any, planning_problems: Any) -> tuple[bool, str]:
     from commonroad_dc.feasibility import solution_checker
 
+    if endless(scenario.lanelet_network):  # no map that it can lay out
+        return False, "none"
     try:
         solution_checker.boundary_collision(scenario, planning_problems, solution)
         return True, "triangulation"

@@ -69,15 +69,18 @@ def search_with(
     if fallbacks is None or visits is not None or found.status is not SearchStatus.NONE_FEASIBLE:
         return found
     asked = {name, *(backend.capabilities.members or dict)()}
+    refused = {each: {p.t_rep for p in found.probes if (p.by or name) == each} for each in asked}
     for each, other in fallbacks().items():
         if each in asked or found.status is not SearchStatus.NONE_FEASIBLE:
             continue
         left = None if settings.time_limit is None else max(settings.time_limit - found.wall_time, 0.0)
         again = search_f_ttr(
             around or (situation.unguided if other.capabilities.own_way else situation.source),
-            situation.conflict, Guarded(other, each), situation.judge, replace(settings, time_limit=left),
+            situation.conflict, _Unaided(other, each, refused), situation.judge,
+            replace(settings, time_limit=left),
             on_probe=None if on_probe is None else partial(_told, on_probe, each),
         )  # fmt: skip
+        refused[each] = {probe.t_rep for probe in again.probes}
         found = replace(
             again,
             probes=(*found.probes, *(replace(probe, by=each, fallback=True) for probe in again.probes)),

@@ -38,7 +38,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             EgoConfig,
             ("scipy",),
             "soft penalties on a uniform B-spline, deformation and refinement (the paper)",
-            fallbacks=("shooting",),
+            fallbacks=("qptr", "shooting", "casadi"),
         ),
         "casadi": BackendSpec(
             "repair.solvers.casadi.backend:make",
@@ -46,14 +46,14 @@ BACKENDS: Registry[BackendSpec] = Registry(
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
             helpers=("ego", "shooting"),
-            fallbacks=("ego", "shooting"),
+            fallbacks=("ego", "qptr", "shooting"),
         ),
         "qptr": BackendSpec(
             "repair.baselines.qptr.backend:make",
             QptrConfig,
             ("qpsolvers",),
             "Bernstein QP in a convex driving corridor (baseline)",
-            fallbacks=("ego", "shooting"),
+            fallbacks=("ego", "shooting", "casadi"),
         ),
         "shooting": BackendSpec(
             "repair.solvers.shooting.backend:make",

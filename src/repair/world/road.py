@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array
 from repair.scene.road.joints import Bridge
-from repair.scene.road.sections import outlines
+from repair.scene.road.sections import endless, outlines
 
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
@@ -279,6 +279,8 @@ class RoadBoundary:
             from commonroad_dc.boundary import construction
 
             try:
+                if endless(self._scenario.lanelet_network):
+                    raise ValueError("neighbours lead back to where they began")
                 parts = construction.construct(self._scenario, ["section_triangles", "triangulation"])
             except Exception:  # whatever goes wrong in there, there is no triangulation to ask
                 self._triangles = False

@@ -9,7 +9,31 @@ import numpy as np
 
 from repair.arrays import Array
 
-__all__ = ["outlines"]
+__all__ = ["endless", "outlines"]
+
+
+def endless(network: Any) -> bool:
+    """Whether neighbours lead back to where they began, as in a map with a wrong link: it has no sections."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
+    return any(_turns_back(lanelets, first, left) for first in lanelets for left in (False, True))
+
+
+def _turns_back(lanelets: Mapping[int, Any], lanelet_id: int, to_the_left: bool) -> bool:
+    """Whether the way to the outermost neighbour on a side comes by a lanelet twice, in one direction."""
+    forward, seen = True, set()
+    while lanelet_id in lanelets:
+        if (lanelet_id, forward) in seen:
+            return True
+        seen.add((lanelet_id, forward))
+        lanelet_id, forward = _beside(lanelets[lanelet_id], forward, to_the_left)
+    return False
+
+
+def _beside(lanelet: Any, forward: bool, to_the_left: bool) -> tuple[Any, bool]:
+    """The next lanelet on a side of the chain, and whether it runs in the chain's direction."""
+    if forward == to_the_left:
+        return lanelet.adj_left, forward == bool(lanelet.adj_left_same_direction)
+    return lanelet.adj_right, forward == bool(lanelet.adj_right_same_direction)
 
 
 def outlines(network: Any, *, sections_alone: bool = False) -> list[Any]:
@@ -62,14 +86,9 @@ def _neighbours(
     chain = [(lanelet_id, forward)]
     seen = {lanelet_id}
     while True:
-        lanelet = lanelets[lanelet_id]
-        if forward == to_the_left:
-            lanelet_id, same = lanelet.adj_left, lanelet.adj_left_same_direction
-        else:
-            lanelet_id, same = lanelet.adj_right, lanelet.adj_right_same_direction
+        lanelet_id, forward = _beside(lanelets[lanelet_id], forward, to_the_left)
         if lanelet_id not in lanelets or lanelet_id in seen:
             return chain
-        forward = forward == bool(same)
         chain.append((lanelet_id, forward))
         seen.add(lanelet_id)
 
