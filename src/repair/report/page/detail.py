@@ -14,6 +14,7 @@ from repair.outcome.data import Drawing, Line
 __all__ = ["case_of", "detail_of"]
 
 _POINTS = 70  # of a curve
+_ENDS = 2  # samples at either end without neighbours enough for a second derivative
 _RESTS = 0.5  # who is slower has no lateral acceleration that could be told from its path [m/s]
 
 
@@ -117,6 +118,8 @@ def _lateral(line: Line) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (dx * ddy - dy * ddx) / speed
     made: Array = np.where(speed > _RESTS, found, 0.0)
+    if len(made) > 2 * _ENDS:  # one-sided differences of differences are no accelerations
+        made[:_ENDS], made[-_ENDS:] = made[_ENDS], made[-_ENDS - 1]
     return made
 
 
