@@ -221,12 +221,16 @@ def parts(context: Context, number: int) -> Report:
     from repair.vehicle.transitions import direct_check
 
     made = case(context.path(number), number, "ego")
-    problem, checker, config = chosen_problem(made), made.prepared.checker, made.config
+    problem, checker = chosen_problem(made), made.prepared.checker
     curve: Any = made.backend.solve(problem).curve
     slow_curve = literal.LiteralCurve(curve.t_start, curve.spacing, curve.degree, curve.points.tolist())
     times = checker.times(problem.t_end)
     states = checker.drive(curve, problem.t_end)
-    coarse, vehicle, dt = states.every(config.checker.substeps), made.prepared.scene.vehicle, problem.dt
+    coarse, vehicle, dt = (
+        states.every(checker.config.substeps),
+        made.prepared.scene.vehicle,
+        problem.dt,
+    )
     transitions = len(coarse) - 1
     calls: dict[str, Callable[[], Any]] = {
         "literal sampling": lambda: slow_curve.sample(times),

@@ -15,6 +15,7 @@ from repair.arrays import Array
 from repair.bounds.latest import too_late
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
+from repair.check.settings import sampled
 from repair.check.verdict import Reason
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
@@ -199,7 +200,7 @@ def laid_out(
         occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset, part)
     with phases("checker"):
         allowed = [reference_limits(limits, config.limits, vehicle, accepted=told) for told in (False, True)]
-        checker = Checker(scene, limits, config.checker, allowed[0], like)
+        checker = Checker(scene, limits, sampled(config.checker, scene.dt), allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
     with phases("reference"):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from repair.settings import setting
 
-__all__ = ["CheckerConfig"]
+__all__ = ["CheckerConfig", "sampled"]
+
+_APART = 0.0625  # [s]
 
 
 @dataclass
@@ -15,7 +18,8 @@ class CheckerConfig:
 
     substeps: int = setting(
         4,
-        "samples per scenario step at which the road is looked at and the ego's curve is followed",
+        "samples per scenario step at which the road is looked at and the ego's curve is followed; more "
+        "where they would be more than 0.0625 s apart",
         low=1,
         high=50,
     )
@@ -63,3 +67,15 @@ class CheckerConfig:
     extra: list[str] = setting(
         factory=list, says="registered checks that a repair has to pass too", registry="check"
     )
+
+
+def sampled(config: CheckerConfig, dt: float) -> CheckerConfig:
+    """The same with samples that are close enough at long steps: between them the ego moves along a chord.
+
+    Parameters
+    ----------
+    config : CheckerConfig
+    dt : float
+        Scenario time step [s].
+    """
+    return replace(config, substeps=max(config.substeps, math.ceil(dt / _APART - 1e-9)))

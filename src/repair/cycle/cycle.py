@@ -83,7 +83,7 @@ class Cycle:
         repaired = self.f_ttr is not None and np.isfinite(self.f_ttr)
         t_end = self.prepared.t_end if repaired else self.prepared.t_reference
         driven = self.prepared.checker.drive(self.curve, t_end)
-        return driven.every(self.prepared.config.checker.substeps)
+        return driven.every(self.prepared.checker.config.substeps)
 
     @property
     def trajectory(self) -> Any:

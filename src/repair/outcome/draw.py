@@ -127,7 +127,7 @@ def _after(
     lines = []
     for kind, name, curve, end in curves:
         steps = max(math.ceil((end - curve.t_start) / prepared.scene.dt - STEP), 1)
-        count = steps * prepared.config.checker.substeps
+        count = steps * prepared.checker.config.substeps
         samples = curve.sample(np.linspace(curve.t_start, end, count + 1))
         path = prepared.scene.frame.cartesian(samples)
         columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
@@ -203,7 +203,7 @@ def _unrepaired(prepared: Prepared, found: SearchResult, moment: int) -> Array |
     if found.status is not SearchStatus.FOUND:
         return None
     driven = prepared.checker.drive(prepared.reference, prepared.t_reference)
-    driven = driven.every(prepared.config.checker.substeps)
+    driven = driven.every(prepared.checker.config.substeps)
     if moment >= len(driven):
         return None
     return _rounded(np.array([driven.x[moment], driven.y[moment], driven.orientation[moment]]))

@@ -57,7 +57,7 @@ def what_is_driven(prepared: Prepared, found: SearchResult, phases: Phases | Non
     phases : Phases, optional
         Where the time that the end takes is noted.
     """
-    checker, substeps = prepared.checker, prepared.config.checker.substeps
+    checker, substeps = prepared.checker, prepared.checker.config.substeps
     curve = driven_curve(prepared, found)
     t_rep = 0.0 if found.curve is None else float(found.f_ttr or 0.0)
     t_end = prepared.t_reference if found.curve is None else prepared.t_end
