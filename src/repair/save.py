@@ -30,7 +30,7 @@ from repair.vehicle.states import DrivenStates
 
 __all__ = ["FORMATS", "Files", "Format", "Saved", "register", "saved"]
 
-_FIGURES = ("profiles.png", "birdseye.png")
+_FIGURES = ("profiles.png", "birdseye.png", "timeline.png")
 
 
 @dataclass(frozen=True)
@@ -127,10 +127,12 @@ def figure_files(result: Saved) -> Files:
     from repair.report.birdseye import birdseye_figure
     from repair.report.profiles import profile_figure
     from repair.report.style import render
+    from repair.report.timeline import timeline_figure
 
-    made = (profile_figure(result.outcome), birdseye_figure(result.outcome))
-    drawn = {name: render(figure) for name, figure in zip(_FIGURES, made, strict=True)}
-    return Files(drawn, {"figure_files": list(_FIGURES)})
+    drawing = (profile_figure, birdseye_figure, timeline_figure)
+    made = {name: draw(result.outcome) for name, draw in zip(_FIGURES, drawing, strict=True)}
+    drawn = {name: render(figure) for name, figure in made.items() if figure is not None}
+    return Files(drawn, {"figure_files": list(drawn)}, _FIGURES)
 
 
 def scenario_file(result: Saved) -> Files:

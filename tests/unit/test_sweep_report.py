@@ -44,7 +44,7 @@ def test_counts_rejections_and_reasons():
     reasons = section(text, "Not repaired, and why")
     assert "| b.xml | constant | ego | none_feasible |" in reasons
     assert "a / b" in reasons  # a pipe would break the table
-    assert "| constant | ego | 3 | 0 | 1 | 0 | 1 | 1 | 1 of 2 |" in section(text, "How many")
+    assert "| constant | ego | 3 | 0 | 1 | 0 | 1 | 0 | 1 | 1 of 2 |" in section(text, "How many")
     assert "### Reference: constant" in section(text, "Every file")
 
 

@@ -53,7 +53,9 @@ def drawing_of(
     at = found.conflict.time if np.isfinite(found.conflict.time) else prepared.t_end
     moment, end = round(at / dt), round(until / dt)
     # The conflict first: where labels would cover each other, the earlier one stays.
-    steps = tuple(dict.fromkeys([moment, 0, end, moment // 2]))
+    hit = mitigation.best.impact.time if mitigation is not None and mitigation.best is not None else np.inf
+    shown = [moment, 0, end, moment // 2, *([round(hit / dt)] if np.isfinite(hit) else [])]
+    steps = tuple(dict.fromkeys(shown))
     lines = (*_lines(prepared, found, until), *_after(prepared, terminal, onward, mitigation))
     driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
     seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])

@@ -49,6 +49,7 @@ def birdseye_figure(outcome: Outcome) -> Any:
             axes.plot(stop.line.x, stop.line.y, label=stop.label.replace("\n", " "), zorder=4.2, **stop.style)
         _draw_vehicles(axes, outcome, window)
         _draw_departures(axes, outcome)
+        _draw_impact(axes, outcome)
         axes.set(
             xlim=window[0],
             ylim=window[1],
@@ -67,6 +68,9 @@ def _window(drawing: Drawing) -> tuple[_Window, float]:
     reference = drawing.lines[0]
     driven = [reference, *(line for line in drawing.lines if line.kind == "continuation")]
     points = np.vstack([*(np.column_stack([line.x, line.y]) for line in driven), drawing.ego[:, :2]])
+    ends = [line for line in drawing.lines if line.kind == "mitigation" and line.name != "none"]
+    if ends:  # what comes after an impact is nobody's motion
+        points = np.column_stack([ends[0].x, ends[0].y])
     road = np.vstack(drawing.edges) if drawing.edges else points
     # No further than the road goes.
     low = np.maximum(points.min(axis=0) - 10.0, road.min(axis=0) - 2.0)
@@ -122,6 +126,21 @@ def _draw_departures(axes: Any, outcome: Outcome) -> None:
     if places:
         x, y = zip(*dict.fromkeys(map(tuple, places)), strict=True)
         axes.plot(x, y, ls="", marker="x", ms=7, mew=1.8, color="#D00000", zorder=6, label="off the road")
+
+
+def _draw_impact(axes: Any, outcome: Outcome) -> None:
+    """Where the motion that hits least hard ends: the ego then, and the place of contact."""
+    told = outcome.record.get("mitigation") or {}
+    time, place = told.get("contact_t_s"), told.get("place_m")
+    if time is None or place is None:
+        return
+    steps = told["trajectory"]
+    columns = (steps["x_m"], steps["y_m"], np.unwrap(steps["orientation_rad"]))
+    x, y, psi = (float(np.interp(time, steps["t_s"], column)) for column in columns)
+    corners = _placed(drawing_in(outcome).body, x, y, psi)
+    axes.fill(*corners.T, fill=False, ec="#CC79A7", lw=1.8, zorder=6, label=f"ego then, {time:.3g} s")
+    words = f"impact, {told['impact_speed_mps']:.3g} m/s"
+    axes.plot(*place, ls="", marker="*", ms=10, color="#CC79A7", mec="#000000", zorder=7, label=words)
 
 
 def _draw_motion(axes: Any, drawing: Drawing, window: _Window) -> None:

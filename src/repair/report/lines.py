@@ -101,7 +101,7 @@ def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) ->
 
 
 def continuation_lines(outcome: Outcome) -> list[Styled]:
-    """The stop after the repair, dash-dotted, red where it fails; and what is driven after it."""
+    """The stop after the repair, dash-dotted, red where it fails; what is driven after it; a last resort."""
     found = []
     for line in drawing_in(outcome).lines:
         if line.kind == "continuation":
@@ -111,6 +111,9 @@ def continuation_lines(outcome: Outcome) -> list[Styled]:
         elif line.kind == "onward":
             label = "on to the goal" if line.name == "goal" else "back to the\nreference"
             found.append(Styled(line, label, {"color": "#009E73", "lw": 1.8}))
+        elif line.kind == "mitigation":
+            label = "least impact" if line.name != "none" else "nothing touched"
+            found.append(Styled(line, label, {"color": "#CC79A7", "lw": 2.4}))
     return found
 
 

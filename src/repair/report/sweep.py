@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any
 
+from repair.report.timeline import text_bar
+
 __all__ = ["sweep_report"]
 
 Row = Mapping[str, Any]
@@ -30,6 +32,8 @@ def sweep_report(rows: Sequence[Row], command: str) -> str:
         "## How many\n\n" + _summary(rows, backends, references),
         "## What CommonRoad's own checker says\n\n" + _official(rows),
         "## How repairs end\n\n" + _endings(rows, backends, references),
+        *(["## How late is too late\n\n" + _timelines(late)] if (late := _asked_late(rows)) else []),
+        *(["## What hits least hard\n\n" + _impacts(hits)] if (hits := _hits(rows)) else []),
         "## Backends compared\n\n" + _compared(rows, backends),
         "## F-TTR above the TTR\n\n" + _above(rows),
         "## Repaired although braking does not help\n\n" + _beyond_braking(rows),
@@ -74,15 +78,15 @@ def _summary(rows: Sequence[Row], backends: Sequence[str], references: Sequence[
             times = [1e3 * r["search_time_s"] for r in own if r["search_time_s"] is not None and r["probes"]]
             body.append((
                 reference, backend, len(own), status["no_conflict"], status["found"] - instead, instead,
-                status["none_feasible"],
-                len(own) - sum(status[s] for s in ("no_conflict", "found", "none_feasible")),
+                status["none_feasible"], status["unavoidable"],
+                len(own) - sum(status[s] for s in ("no_conflict", "found", "none_feasible", "unavoidable")),
                 f"{len(helped)} of {len(braking)}",
                 round(median(times), 1) if times else None,
                 sum(bool(r.get("margin_only")) for r in own),
             ))  # fmt: skip
     head = ("reference", "backend", "files", "no conflict", "repaired", "by a fallback", "none feasible",
-            "other", "repaired by itself of those that braking at 8 m/s² avoids", "median search [ms]",
-            "conflicts that are margin only")  # fmt: skip
+            "unavoidable", "other", "repaired by itself of those that braking at 8 m/s² avoids",
+            "median search [ms]", "conflicts that are margin only")  # fmt: skip
     return _table(head, body)
 
 
@@ -154,6 +158,34 @@ def _endings(rows: Sequence[Row], backends: Sequence[str], references: Sequence[
         names = ("file", "reference", "backend", "F-TTR [s]", "what full braking fails on")
         text += "\n\n" + _table(names, [[r[k] for k in keys] for r in unsafe])
     return text
+
+
+def _asked_late(rows: Sequence[Row]) -> list[Row]:
+    """Those of which the bound was asked for."""
+    return [
+        r for r in rows if r.get("ttc_s") and (r.get("t_bound_s") is not None or r.get("gap_s") is not None)
+    ]
+
+
+def _timelines(rows: Sequence[Row]) -> str:
+    body = [
+        (r["file"], r["reference"], r["backend"], r["f_ttr_s"], r["t_bound_s"], r["gap_s"], r["ttc_s"],
+         f"`{text_bar(r['f_ttr_s'], r['t_bound_s'], r['ttc_s'], 30)}`")
+        for r in rows
+    ]  # fmt: skip
+    head = ("file", "reference", "backend", "F-TTR [s]", "bound [s]", "gap [s]", "TTC [s]", "until the TTC")
+    words = "From 0 to the TTC: `=` a repair is verified, `?` unknown, `x` proven too late.\n\n"
+    return words + _table(head, body)
+
+
+def _hits(rows: Sequence[Row]) -> list[Row]:
+    return [r for r in rows if r.get("impact_speed_mps") is not None]
+
+
+def _impacts(rows: Sequence[Row]) -> str:
+    keys = ("file", "reference", "backend", "status", "impact_speed_mps", "braking_impact_speed_mps")
+    head = (*keys[:4], "impact speed [m/s]", "of full braking [m/s]")
+    return _table(head, [[r[k] for k in keys] for r in rows])
 
 
 def _value(row: Row) -> float:

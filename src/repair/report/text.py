@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from repair.report.bound import bound_rows
 from repair.report.notes import grouped
+from repair.report.rows.bound import bound_rows
 from repair.report.rows.mitigation import mitigation_rows
 from repair.report.rows.why import why_rows
+from repair.report.timeline import timeline_rows
 
 __all__ = ["fixed", "headline", "probe_table", "summary"]
 
@@ -67,6 +68,7 @@ def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[s
         ("TTC", _ttc(content)),
         ("F-TTR", _f_ttr(content)),
         *bound_rows(content),
+        *timeline_rows(content),
         *why_rows(content),
         *mitigation_rows(content),
     ]

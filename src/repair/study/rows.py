@@ -18,6 +18,7 @@ COLUMNS = (
     "from_behind", "ttc_s", "contact_ttc_s", "checked_until_s", "decided_by", "f_ttr_s", "ttb_s", "ttr_s",
     "maneuver", "repaired_by", "by_fallback",
     "peak_deceleration_mps2", "peak_acceleration_mps2", "peak_lateral_acceleration_mps2", "min_speed_mps",
+    "t_bound_s", "gap_s", "impact_speed_mps", "braking_impact_speed_mps",
     "ending", "ending_maneuver", "ending_detail", "onward", "onward_reached", "onward_detail",
     "largest_residual", "probes", "official_feasible", "official_collision_free", "official_on_road",
     "official_solved", "official_vehicle_model", "official_connected", "official_start", "official_goal",

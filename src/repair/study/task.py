@@ -204,6 +204,7 @@ def _row(task: Task, kept: Kept) -> tuple[dict[str, Any], bytes | None]:
         **{f"{name}_time_s": round(spent[name], 5) for name in ("search", "build", "solve", "check")},
     )
     row.update(_ending(content["terminal"]))
+    row.update(_late(content))
     if (onward := content["onward"]) is not None:
         row.update(onward=onward["kind"], onward_reached=onward["reached"], onward_detail=onward["sentence"])
     if task.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
@@ -234,6 +235,17 @@ def _why(probe: Any) -> str:
     tried = "; ".join(probe.tried)
     details = "; ".join(f"{v.reason.value} at {v.time:.2f} s: {v.detail}" for v in probe.verdict.violations)
     return f"{tried} | {details}" if tried else details
+
+
+def _late(content: dict[str, Any]) -> dict[str, Any]:
+    """The bound, and the impact speeds where nothing was found; where they were asked for."""
+    bound, hit = content["bound"] or {}, content["mitigation"] or {}
+    return {
+        "t_bound_s": bound.get("t_bound_s"),
+        "gap_s": bound.get("gap_s"),
+        "impact_speed_mps": hit.get("impact_speed_mps"),
+        "braking_impact_speed_mps": (hit.get("full_braking") or {}).get("impact_speed_mps"),
+    }
 
 
 def _ending(terminal: dict[str, Any] | None) -> dict[str, Any]:
