@@ -12,6 +12,7 @@ import json
 import time
 import warnings
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +20,13 @@ import numpy as np
 ASKED = ("report", "require")
 
 
-def row(file: Path, backend: str, reference: str, asked: str) -> dict:
+def row(file: Path, backend: str, reference: str, asked: str, more: Sequence[str] = ()) -> dict:
     """F-TTR, ending and processor time of one repair."""
     import repair
     from repair.errors import RepairError
 
     begin = time.process_time()
-    keys = [f"reference.source={reference}", f"checker.terminal={asked}", "fallback=[]"]
+    keys = [f"reference.source={reference}", f"checker.terminal={asked}", "fallback=[]", *more]
     said = {"file": file.name, "backend": backend, "reference": reference, "asked": asked}
     try:
         result = repair.repair(file, backend=backend, overrides=keys)
@@ -89,6 +90,7 @@ def main() -> int:
     parser.add_argument("--backend", nargs="+", default=["casadi"])
     parser.add_argument("--reference", nargs="+", default=["constant", "planner"])
     parser.add_argument("--asked", nargs="+", default=ASKED, choices=ASKED)
+    parser.add_argument("--set", nargs="+", default=[], help="further keys")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     kept = given.out is not None and given.out.exists()
@@ -99,7 +101,7 @@ def main() -> int:
             for reference in given.reference:
                 for asked in given.asked:
                     if (file.name, backend, reference, asked) not in done:
-                        rows.append(row(file, backend, reference, asked))
+                        rows.append(row(file, backend, reference, asked, given.set))
                         if given.out is not None:
                             given.out.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     tell(rows)

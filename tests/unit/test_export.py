@@ -565,7 +565,7 @@ def test_a_result_of_an_earlier_version_is_certified(copied: Path) -> None:
 
 
 def test_every_format_names_its_files(found: RepairResult, tmp_path: Path) -> None:
-    assert FORMATS.names() == ("solution", "figures", "scenario", "drawing", "proof")
+    assert FORMATS.names() == ("solution", "mitigation", "figures", "scenario", "drawing", "proof")
 
     def text(result: Any) -> Files:
         return Files({f"{result.name}.txt": b"mine"}, {"text_file": f"{result.name}.txt"}, ("old.txt",))

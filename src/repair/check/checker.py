@@ -14,7 +14,14 @@ from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
 from repair.check.followed import Followed, is_finite, motion_of
-from repair.check.limits import Excess, curve_excess, plane_excess, speed_excess, surely_kept, vehicle_excess
+from repair.check.limits import (
+    as_violation,
+    curve_excess,
+    plane_excess,
+    speed_excess,
+    surely_kept,
+    vehicle_excess,
+)
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
@@ -110,9 +117,11 @@ class Checker:
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
         """Verdict on ``curve`` after the reference until ``problem.t_rep``.
 
-        Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked.
+        Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked. Where
+        the vehicle stands there, from the last step on at which it does not.
         """
-        first = max(steps_until(problem.t_rep, self.scene.dt) - 1, 0) * self.config.substeps
+        n, step = self.config.substeps, steps_until(problem.t_rep, self.scene.dt) - 1
+        first = self._kept(problem.reference, problem.t_end).moving(step, n) if step > 0 else 0
         times = self.times(problem.t_end)
         after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
         path, s, slip0 = self._spliced(problem, after, times, first)
@@ -126,7 +135,7 @@ class Checker:
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         if self.config.limits and not found:
             at = slice(None, None, self.config.substeps)
-            found += _as_violation(vehicle_excess(path.t[at], path.speed[at], slip[at], self.scene.vehicle))
+            found += as_violation(vehicle_excess(path.t[at], path.speed[at], slip[at], self.scene.vehicle))
         if not found and self.config.gaps == "as_reference":
             found += self._over_a_gap(problem, path, orientation)
         if not first and not found and problem.t_rep < INSTANT:
@@ -302,14 +311,14 @@ class Checker:
         broken = curve_excess(curve, problem.t_rep, problem.t_end, self.limits, slack)
         if not surely_kept(path, len(path.t) - len(after), self.limits, self.scene.vehicle):
             broken += plane_excess(curve, after, self.scene.frame, self.limits, self.scene.vehicle, slack)
-        return _as_violation(broken)
+        return as_violation(broken)
 
     def _reference_limits(self, reference: Curve, t_end: float) -> list[Violation]:
         """Limits of speed and acceleration that the reference breaks; its jerk is nobody's claim."""
         samples, scene = reference.sample(self.times(t_end)), self.scene
         limits, slack = self.reference_limits, self.config.tolerance
         broken = plane_excess(reference, samples, scene.frame, limits, scene.vehicle, slack)
-        return _as_violation(broken + speed_excess(samples, limits, slack))
+        return as_violation(broken + speed_excess(samples, limits, slack))
 
     def _kinematics(
         self, path: CartesianPath, slip: Array, orientation: Array, until: float = float("inf")
@@ -337,11 +346,3 @@ class Checker:
 
 
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
-
-
-def _as_violation(broken: list[Excess]) -> list[Violation]:
-    """Broken limits as one violation, from the first of them on."""
-    if not broken:
-        return []
-    words = "; ".join(dict.fromkeys(excess.words for excess in broken))
-    return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from repair.arrays import Array
 from repair.curves.base import Curve, FrenetTrajectory
+from repair.curves.plane import STANDSTILL
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
@@ -42,6 +43,15 @@ class Followed:
     slip: Array
     heading: float
     crosses: bool = False
+
+    def moving(self, step: int, substeps: int) -> int:
+        """The dense sample of the last step until ``step`` at which the vehicle moves, or the first one.
+
+        A path that begins at rest does not say how the body stands.
+        """
+        rates = self.motion[2, : step * substeps + 1 : substeps]
+        moving = np.flatnonzero(np.abs(rates) > 2.0 * STANDSTILL)
+        return int(moving[-1]) * substeps if len(moving) else 0
 
 
 def motion_of(trajectory: FrenetTrajectory, count: int) -> Array:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from repair.arrays import Array, largest, smallest
+from repair.check.verdict import Reason, Violation
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import CartesianPath
 from repair.problem.limits import Limits
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ROUNDING",
     "Excess",
+    "as_violation",
     "curve_excess",
     "plane_accelerations",
     "plane_excess",
@@ -277,3 +279,11 @@ def _against(
         (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}", 1.0),
         (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}", 1.0),
     )
+
+
+def as_violation(broken: list[Excess]) -> list[Violation]:
+    """Broken limits as one violation, from the first of them on."""
+    if not broken:
+        return []
+    words = "; ".join(dict.fromkeys(excess.words for excess in broken))
+    return [Violation(Reason.LIMITS, min(excess.time for excess in broken), words)]
