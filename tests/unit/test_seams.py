@@ -223,7 +223,7 @@ def test_a_repair_crosses_gaps_of_the_map_only_where_its_reference_does(tmp_path
     standing = roads.car(30, roads.state(90.0, 0.0, v=0.0))
     scene = loaded(tmp_path, road, standing, roads.state(0.0, 0.0, v=25.0))
     kept, crossed = (
-        answer(scene, "shooting", f"checker.gaps={gaps}", "search.delta_t=0.1", "search.rule=scan")
+        answer(scene, "shooting", f"checker.gaps={gaps}")
         for gaps in ("as_reference", "always")
     )
     assert kept.search.best.maneuver.value == "yield"
