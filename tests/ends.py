@@ -198,7 +198,8 @@ def main() -> int:
         result = repair.repair(file, backend=backend, overrides=[f"reference.source={reference}"])
         if result.terminal is None:
             return
-        count[f"{result.terminal.ending.value} ({result.terminal.continuation.maneuver})"] += 1
+        shown = result.terminal.continuation
+        count[f"{result.terminal.ending.value} ({shown.maneuver if shown else 'no stop'})"] += 1
         if wrong := fault(result, file):
             print(f"{backend}, {reference}, {result.terminal.ending.value}: {wrong}: {words}")
             count["wrong"] += 1
