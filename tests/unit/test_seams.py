@@ -222,10 +222,7 @@ def test_a_repair_crosses_gaps_of_the_map_only_where_its_reference_does(tmp_path
     road = roads.strip(1, straight(-50.0, FAR)) + roads.strip(2, straight(-50.0, FAR, 4.2))
     standing = roads.car(30, roads.state(90.0, 0.0, v=0.0))
     scene = loaded(tmp_path, road, standing, roads.state(0.0, 0.0, v=25.0))
-    kept, crossed = (
-        answer(scene, "shooting", f"checker.gaps={gaps}")
-        for gaps in ("as_reference", "always")
-    )
+    kept, crossed = (answer(scene, "shooting", f"checker.gaps={gaps}") for gaps in ("as_reference", "always"))
     assert kept.search.best.maneuver.value == "yield"
     assert crossed.search.best.maneuver.value == "left"
     assert crossed.f_ttr > kept.f_ttr
