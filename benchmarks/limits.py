@@ -41,7 +41,7 @@ def forget() -> None:
 
     for module in (axis, structure, time_grid, model, speeds):
         for value in list(vars(module).values()):
-            if hasattr(value, "cache_clear"):
+            if hasattr(value, "cache_clear") and not isinstance(value, type):
                 value.cache_clear()
 
 

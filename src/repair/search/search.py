@@ -27,6 +27,9 @@ from repair.timegrid import INSTANT, ROUNDING, on_grid
 __all__ = ["iter_probes", "search_f_ttr"]
 
 
+_HELP = 0.05  # [s] below which a helper is not asked: laying out its task alone may take as long
+
+
 def iter_probes(
     source: ProblemSource,
     backend: RepairBackend,
@@ -182,6 +185,9 @@ def _helped(
     helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
     for make in helpers.values():
         if probe.feasible or budget.spent:
+            break
+        if (left := budget.left) is not None and left < _HELP:
+            budget.cut = True
             break
         try:
             helper = make()
