@@ -330,6 +330,7 @@ def test_progress_where_nobody_watches(capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive  # it hangs on how fast processes start
 def test_processes_that_break_are_rows(study, folder):
     first = tasks_of(replace(study, memory=800.0))[0]
     names = ("fine.xml", "dies.xml", "hangs.xml", "grows.xml", "also.xml")
@@ -398,6 +399,7 @@ def killed(folder, tmp_path, study, signals):
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.exhaustive  # it hangs on how fast processes start
 def test_killed_it_goes_on(folder, tmp_path, study):
     killed(folder, tmp_path, study, [signal.SIGKILL])
 
