@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from repair.cli import certify, info, paper, report, run, scenarios, study, sweep
+from repair.cli import info, paper, r157, run, scenarios, study, sweep, written
 from repair.cli.arguments import UsageError, no_arguments
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
@@ -49,7 +49,7 @@ class Verb:
 
 VERBS: tuple[Verb, ...] = (
     Verb("run", "repair one scenario: TTC, F-TTR, a checked trajectory", run.run_arguments, run.run),
-    Verb("certify", "recompute every margin of a written result", certify.certify_arguments, certify.certify),
+    Verb("certify", "recompute every margin of a written result", written.certify_arguments, written.certify),
     Verb(
         "scenarios",
         "what files hold: ego, traffic, route, and what of the map was bridged",
@@ -57,7 +57,7 @@ VERBS: tuple[Verb, ...] = (
         scenarios.scenarios,
     ),
     Verb("study", "repair many scenarios as a file says, resumable", study.study_arguments, study.study),
-    Verb("report", "one page of HTML about a study or a result", report.report_arguments, report.report),
+    Verb("report", "one page of HTML about a study or a result", written.report_arguments, written.report),
     Verb("sweep", "repair all scenarios of a folder", sweep.sweep_arguments, sweep.sweep),
     Verb("table1", "the paper's Table I, paper and ours", paper.table1_arguments, paper.table1),
     Verb("table2", "the paper's Table II, times on this machine", paper.table2_arguments, paper.table2),
@@ -68,6 +68,7 @@ VERBS: tuple[Verb, ...] = (
         paper.sensitivity,
     ),
     Verb("figures", "draw the paper's Figures 4, 5 and 6", paper.figures_arguments, paper.figures),
+    Verb("r157", "UN R157's cut-in, cut-out and deceleration cases", r157.r157_arguments, r157.r157),
     Verb("backends", "list the backends, and what is missing", no_arguments, info.backends),
     Verb("presets", "list the bundled presets", no_arguments, info.presets),
     Verb("config", "print the resolved configuration as YAML", info.config_arguments, info.config),

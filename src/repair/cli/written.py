@@ -1,4 +1,4 @@
-"""``repair report``."""
+"""``repair certify`` and ``repair report``: what is asked of something written."""
 
 from __future__ import annotations
 
@@ -8,7 +8,22 @@ from typing import Any
 
 from repair.cli.arguments import UsageError
 
-__all__ = ["report", "report_arguments"]
+__all__ = ["certify", "certify_arguments", "report", "report_arguments"]
+
+
+def certify_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair certify``."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="what `repair run --out DIR` wrote")
+
+
+def certify(arguments: argparse.Namespace) -> int:
+    """Exit status 1 where a margin is violated."""
+    from repair.certify.certificate import format_certificate
+    from repair.certify.recompute import certify as recompute
+
+    certificate = recompute(arguments.folder)
+    print(format_certificate(certificate))
+    return 0 if certificate.ok else 1
 
 
 def report_arguments(parser: argparse.ArgumentParser) -> None:
