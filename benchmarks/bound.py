@@ -78,7 +78,12 @@ def shot(prepared, kind: str, late) -> tuple[int, int, float]:
 def measured(path: Path, reference: str, scan: bool, shoot: bool) -> dict | None:
     """One case; None where there is no conflict."""
     config = repair.load_config(
-        overrides=[f"reference.source={reference}", f"search.delta_t={GRID}", "search.rule=scan"]
+        overrides=[
+            f"reference.source={reference}",
+            f"search.delta_t={GRID}",
+            "search.rule=scan",
+            "search.proofs=false",
+        ]
     )
     prepared = repair.prepare(repair.load_scene(path, config), config)
     if not 0.0 < prepared.conflict.time < math.inf:

@@ -203,7 +203,7 @@ def repair(
         What is followed, from memory, instead of what ``reference.source`` names: an array (N, 3..5) with the
         columns ``t [s], x [m], y [m][, yaw [rad][, v [m/s]]]``, a mapping with these names, a CommonRoad
         trajectory, a curve in the scene's frame, or an earlier result; see
-        :func:`repair.reference.given.given_reference`.
+        :func:`repair.reference.given.given_reference`. Or ``"constant"`` and the like, or a solution file.
     traffic : iterable, optional
         All other traffic there is, from memory, instead of the scenario's: CommonRoad obstacles and
         :class:`repair.Prediction`; see :func:`repair.with_traffic`.
@@ -331,7 +331,7 @@ def find(
     if prepared.config.driver != "at_ttr":
         return search_with(
             backend, name, prepared, settings,
-            visits=visits, too_late=prepared.too_late, on_probe=on_probe,
+            visits=visits, too_late=prepared.too_late, hopeless=prepared.hopeless, on_probe=on_probe,
         )  # fmt: skip
     begin = time.perf_counter()
     try:

@@ -6,17 +6,19 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from repair.arrays import Array
-from repair.bounds.latest import too_late
+from repair.bounds.latest import Quick, too_late
 from repair.check.checker import Checker
 from repair.check.conflict import detect_conflict
 from repair.check.settings import sampled
 from repair.check.verdict import Reason
+from repair.config.agreed import agreed_with, with_given, with_named
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
@@ -34,7 +36,6 @@ from repair.reference.registry import (
 from repair.scene.reframe import as_ego, reframe
 from repair.scene.road.sections import endless
 from repair.scene.scene import Scene
-from repair.scene.settings import LOADING, SceneConfig
 from repair.scene.traffic.obstacle import Obstacle
 from repair.situation import Situation
 from repair.solvers.registry import sections
@@ -95,6 +96,11 @@ class Prepared(Situation):
             return None
         return partial(too_late, self, self.config.bound)
 
+    @cached_property
+    def hopeless(self) -> Quick:
+        """Says of a t_rep whether it is proven in a moment that nothing is feasible there."""
+        return Quick(self)
+
 
 def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     """Occupancy, reference, checker and conflict of a scene.
@@ -105,7 +111,7 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     config : Config
     reference : optional
         A reference from memory, instead of what ``reference.source`` names; see
-        :func:`repair.reference.given.given_reference`.
+        :func:`repair.reference.given.given_reference`. A text is the name of a source, or a file.
 
     Raises
     ------
@@ -117,11 +123,13 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
     if not isinstance(config, Config):
         raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
     require_types(config)
-    config = _agreed(scene, config)
+    config = agreed_with(config, scene)
     phases = Phases()
     given = None
+    if isinstance(reference, str | Path):
+        config, reference = with_named(config, str(reference)), None
     if reference is not None:
-        config, given = _with_given(config), given_reference(reference, scene)
+        config, given = with_given(config), given_reference(reference, scene)
     track = track_along(scene, config.reference) if given is None else given.track
     if track is not None:
         scene = reframe(scene, track.positions, track.heading)
@@ -150,7 +158,7 @@ def again_for(prepared: Prepared, config: Config) -> Prepared:
         If the configurations differ in what matters.
     """
     require_types(config)
-    before, config = prepared.config, _agreed(prepared.scene, config)
+    before, config = prepared.config, agreed_with(config, prepared.scene)
     if what_matters(before) != what_matters(config):
         raise ConfigError("what is prepared was prepared with other settings; prepare it again")
     said = prepared.notes[: len(prepared.notes) - len(_no_effect(before))]
@@ -266,46 +274,6 @@ def _accepted(recording: Recording, vehicle: Vehicle) -> str:
         f"the reference is accepted by CommonRoad's checker for the model {recording.model}; {driven}, for "
         "which solutions are written, cannot drive it everywhere"
     )
-
-
-def _with_given(config: Config) -> Config:
-    """The configuration as it is where the reference is handed over.
-
-    Raises
-    ------
-    ConfigError
-        If it names another source on purpose.
-    """
-    source = config.reference.source
-    if source != "given" and "reference.source" in config.given:
-        raise ConfigError(f"a reference is given, and reference.source={source} names another; leave one out")
-    agreed = replace(config, reference=replace(config.reference, source="given"))
-    agreed.given = config.given
-    return agreed
-
-
-def _agreed(scene: Scene, config: Config) -> Config:
-    """The configuration with what the scene was loaded with.
-
-    Raises
-    ------
-    ConfigError
-        If it asks for something else.
-    """
-    usual, loaded = SceneConfig(), scene.settings
-    for name in LOADING:
-        asked, has = getattr(config.scene, name), getattr(loaded, name)
-        same = asked == has or (name == "planning_problem" and asked == scene.planning_problem_id)
-        if not same and (f"scene.{name}" in config.given or asked != getattr(usual, name)):
-            raise ConfigError(
-                f"the scene was loaded with scene.{name}={has}, and the configuration asks for {asked}; "
-                "load it with the configuration: repair.load_scene(path, config)"
-            )
-    if all(getattr(config.scene, name) == getattr(loaded, name) for name in LOADING):
-        return config
-    agreed = replace(config, scene=replace(config.scene, **{name: getattr(loaded, name) for name in LOADING}))
-    agreed.given = config.given
-    return agreed
 
 
 def _bridged(checker: Checker, places: Array) -> list[str]:

@@ -13,8 +13,10 @@ from tests.crossings import crossing
 from tests.roads import driving, lanelet, problem, scenario, state
 
 import repair
-from repair.bounds.latest import earliest
+from repair.api import find
+from repair.bounds.latest import Quick, earliest
 from repair.bounds.settings import KINDS, BoundConfig
+from repair.solvers.registry import make_backend
 
 
 def prepared(tmp_path, text, *overrides):
@@ -222,3 +224,40 @@ def test_the_bound_is_in_the_console(tmp_path, capsys):
     assert "proven too late from" in text
     assert "Gap" in text
     assert not np.isnan(float(text.split("Gap")[1].split()[0]))
+
+
+# ------------------------------------------------------------------ asked in passing, by a search
+
+
+def test_a_quick_answer_is_never_earlier_than_the_bound_and_stays(tmp_path):
+    situation = prepared(tmp_path, wall())
+    late, quick = repair.bound(situation)["search"].time, Quick(situation)
+    said = [quick(t) for t in np.arange(0.0, situation.conflict.time, 0.1)]
+    assert said == sorted(said)
+    assert any(said)
+    assert not any(quick(t) for t in np.arange(0.0, late - 0.1, 0.1))
+    assert quick(late + 0.05)
+
+
+def test_a_quick_answer_is_no_where_no_limit_is_claimed_and_after_the_conflict(tmp_path):
+    situation = prepared(tmp_path, wall())
+    assert Quick(situation)(situation.conflict.time - 0.1)
+    assert not Quick(situation)(situation.conflict.time + 0.1)
+    situation = prepared(tmp_path, wall(), "checker.limits=false")
+    assert not Quick(situation)(situation.conflict.time - 0.1)
+
+
+@pytest.mark.parametrize("rule", ["scan", "bisect"])
+def test_proofs_leave_out_what_finds_nothing_and_change_no_answer(tmp_path, rule):
+    keys = ["backend=casadi", "fallback=[]", "search.delta_t=0.2", f"search.rule={rule}"]
+    found = {}
+    for proofs in (True, False):
+        situation = prepared(tmp_path, wall(), *keys, f"search.proofs={proofs}")
+        found[proofs] = find(situation, make_backend("casadi", situation.config))
+    assert found[True].f_ttr == found[False].f_ttr > 0.0
+    assert [(p.t_rep, p.feasible) for p in found[True].probes] == [
+        (p.t_rep, p.feasible) for p in found[False].probes
+    ]
+    left_out = [[any("proven" in text for text in p.tried) for p in found[k].probes] for k in (True, False)]
+    assert any(left_out[0])
+    assert not any(left_out[1])

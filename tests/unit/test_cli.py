@@ -310,6 +310,7 @@ def test_presets_and_config(capsys: pytest.CaptureFixture[str]) -> None:
         "upper": 2.0,
         "time_limit": None,
         "sides": "best",
+        "proofs": True,
     }
     assert main(["config", "--table"]) == 0
     table = capsys.readouterr().out

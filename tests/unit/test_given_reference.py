@@ -125,7 +125,7 @@ def shifted(column, by, rows=slice(None)):
 
 
 WRONG = {
-    "none": (lambda v: "nothing", "cannot be read as numbers"),
+    "none": (lambda v: b"nothing", "cannot be read as numbers"),
     "flat": (lambda v: v[:, 0], "of shape"),
     "two columns": (lambda v: v[:, :2], "of shape"),
     "three samples": (lambda v: v[:3], "at least 4"),
@@ -188,6 +188,18 @@ def test_two_references_are_one_too_many(drive, scene):
         repair.repair(scene, reference=table(drive), overrides=["reference.source=constant"])
     found = repair.repair(scene, reference=table(drive), overrides=["reference.source=given"])
     assert found.status == "found"
+
+
+def test_a_reference_may_be_asked_for_by_its_name(scene, usual, path):
+    found = repair.repair(scene, reference="constant")
+    assert found.prepared.config.reference.source == "constant"
+    assert found.to_dict()["f_ttr_s"] == usual.to_dict()["f_ttr_s"]
+    with pytest.raises(ConfigError, match=r"neither one of planner.* nor a file"):
+        repair.repair(scene, reference="constnat")
+    with pytest.raises(ConfigError, match="leave one out"):
+        repair.repair(scene, reference="constant", overrides=["reference.source=planner"])
+    with pytest.raises(ReferenceTrajectoryError, match="solution"):
+        repair.repair(scene, reference=path)  # a scenario, and no solution
 
 
 def test_given_from_the_command_line_is_a_sentence(path, capsys):

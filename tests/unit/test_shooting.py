@@ -253,3 +253,15 @@ def scenario_1():
     config = load_config(backend="shooting", overrides=["search.delta_t=0.2"])
     with paper_scenario("scenario_1") as path:
         return repair.repair(path, config)
+
+
+def test_a_search_that_comes_no_closer_ends():
+    """A wall that is too close: braking fully is the best there is, from the first iteration on."""
+    frame = FrenetFrame.from_points(np.column_stack((np.linspace(-20.0, 200.0, 400), np.zeros(400))))
+    blocked = among(toy.problem((), t_rep=0.0, t_end=4.0), frame, standing(-12.5, 0.0, 0.0, half_width=30.0))
+    counts = {}
+    for patience in (1, 3, 14):
+        solve = ShootingBackend(ShootingConfig(patience=patience)).solve(blocked)
+        assert solve.status is SolveStatus.INFEASIBLE
+        counts[patience] = solve.iterations
+    assert counts[1] <= counts[3] < 0.7 * counts[14]

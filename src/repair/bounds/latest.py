@@ -17,16 +17,18 @@ from repair.bounds.obstacles import Occupied, occupied, with_standing
 from repair.bounds.settings import BoundConfig
 from repair.bounds.start import driven_within, motions_from
 from repair.bounds.tree import Attempt, attempt
+from repair.deadline import in_time
 from repair.timegrid import STEP, steps_until
 from repair.vehicle.model import KinematicSingleTrack
 
 if TYPE_CHECKING:
     from repair.situation import Situation
 
-__all__ = ["Bound", "Proof", "bound", "proof_at", "too_late"]
+__all__ = ["Bound", "Proof", "Quick", "bound", "proof_at", "too_late"]
 
 _AROUND = 40.0  # where the edge of the road is looked at [m]
 _DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
+_FEW = 25  # parts of a quick proof: most proofs have one, and an attempt takes some tens of milliseconds
 
 
 @dataclass(frozen=True)
@@ -134,15 +136,61 @@ def proof_at(situation: Situation, t_rep: float, settings: BoundConfig, kind: st
     kind : str
         For whom (:data:`repair.bounds.settings.KINDS`).
     """
-    if kind == "search" and not situation.checker.config.limits:
+    if not _provable(situation, kind) or not t_rep < situation.conflict.time < math.inf:
         return None
-    if not isinstance(situation.scene.model, KinematicSingleTrack):
-        return None
-    if not t_rep < situation.conflict.time < math.inf:
-        return None
-    world = _World(situation, settings)
-    k, begin = max(math.floor(t_rep / world.h + STEP), 0), time.thread_time()
-    return _proof(kind, world, k, settings.nodes, lambda: time.thread_time() - begin > settings.time_limit)[1]
+    world, begin = _World(situation, settings), time.thread_time()
+    late = lambda: time.thread_time() - begin > settings.time_limit  # noqa: E731
+    return _proof(kind, world, world.sample(t_rep), settings.nodes, late)[1]
+
+
+def _provable(situation: Situation, kind: str) -> bool:
+    """Whether there are proofs at all: limits that are claimed, and a vehicle whose motions are bounded."""
+    claimed = kind == "vehicle" or situation.checker.config.limits
+    return claimed and isinstance(situation.scene.model, KinematicSingleTrack)
+
+
+class Quick:
+    """Whether it is proven too late at a time, for a search that would rather not look there for long.
+
+    Only small proofs are looked for: an answer of no says nothing.
+
+    Parameters
+    ----------
+    situation : Situation
+    """
+
+    def __init__(self, situation: Situation) -> None:
+        self._situation = situation
+        self._world: _World | None = None
+        self._since = math.inf
+        self._asked: set[float] = set()
+
+    def __call__(self, t_rep: float) -> bool:
+        """Whether the checker would call nothing feasible that begins at ``t_rep`` [s] or later.
+
+        Raises
+        ------
+        OutOfTime
+            If the deadline passes.
+        """
+        if t_rep >= self._since:
+            return True
+        if t_rep in self._asked or not t_rep < self._situation.conflict.time < math.inf:
+            return False
+        self._asked.add(t_rep)
+        if not _provable(self._situation, "search"):
+            return False
+        in_time()
+        self._world = self._world or _World(self._situation, BoundConfig())
+        if _proof("search", self._world, self._world.sample(t_rep), _FEW, _in_time)[1] is None:
+            return False
+        self._since = t_rep
+        return True
+
+
+def _in_time() -> bool:
+    in_time()
+    return False
 
 
 class _World:
@@ -167,6 +215,10 @@ class _World:
         # the margin of who is beside the ego at the start does not count until it has been left
         self.counted = ~np.isin(self.whole.owner, list(near)) if near else None
         self._known: dict[str, Occupied] = {}
+
+    def sample(self, t_rep: float) -> int:
+        """The last sample of the reference at or before a time [s]."""
+        return max(math.floor(t_rep / self.h + STEP), 0)
 
     def shapes(self, kind: str) -> Occupied:
         """What is met, for a kind of motions."""

@@ -118,6 +118,7 @@ def _record(prepared: Prepared, given: SearchResult | None) -> dict[str, Any]:
         found = search_with(
             backend, config.backend, prepared, replace(config.search, time_limit=None), around=around,
             visits=around.visits if around else None, too_late=prepared.too_late,
+            hopeless=None if around else prepared.hopeless,
         )  # fmt: skip
         capabilities = capabilities_of(backend, found)
         wanted += ["ttr"] if at_ttr and found.complete and "ttr" not in wanted else []

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from repair.errors import RepairError, in_words
+from repair.errors import RepairError
 
 if TYPE_CHECKING:
     from repair.config import Config
 
-__all__ = ["UsageError", "configuration_arguments", "no_arguments", "reference_names", "resolve"]
+__all__ = ["UsageError", "configuration_arguments", "no_arguments", "resolve"]
 
 # For --help alone, which loads no registry; `repair config --table` lists what is registered too.
 _USUAL = "planner, constant, accelerate, recorded"
@@ -19,13 +19,6 @@ _USUAL = "planner, constant, accelerate, recorded"
 
 class UsageError(RepairError):
     """The command line itself is wrong."""
-
-
-def reference_names() -> tuple[str, ...]:
-    """The sources of references that need no file."""
-    from repair.reference.registry import SOURCES
-
-    return tuple(name for name in SOURCES.names() if name != "file")
 
 
 def configuration_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,29 +40,15 @@ def configuration_arguments(parser: argparse.ArgumentParser) -> None:
 def resolve(arguments: argparse.Namespace) -> Config:
     """The configuration that these arguments make."""
     from repair.config import load_config
+    from repair.reference.registry import named
 
-    given = _reference(arguments.reference)
+    given = {} if arguments.reference is None else named(arguments.reference)
     plain = all(value.isprintable() for value in given.values())
     texts = [f"reference.{key}={_quoted(value)}" for key, value in given.items()] if plain else []
     return load_config(
         arguments.preset, arguments.config, [*texts, *arguments.overrides],
         backend=arguments.backend, reference=None if plain else given,
     )  # fmt: skip
-
-
-def _reference(reference: str | None) -> dict[str, str]:
-    """The keys of the section ``reference`` that ``--reference`` stands for."""
-    if reference is None:
-        return {}
-    if reference in (known := reference_names()):
-        return {"source": reference}
-    try:
-        there = Path(reference).is_file()
-    except OSError:  # a name that is too long
-        there = False
-    if not there:
-        raise UsageError(f"reference {in_words(reference)} is neither one of {', '.join(known)} nor a file")
-    return {"source": "file", "file": Path(reference).resolve().as_posix()}
 
 
 def _quoted(text: str) -> str:

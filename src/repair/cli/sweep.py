@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from repair.cli.arguments import UsageError, reference_names
+from repair.cli.arguments import UsageError
 
 
 def sweep_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +46,7 @@ def sweep_arguments(parser: argparse.ArgumentParser) -> None:
 def sweep(arguments: argparse.Namespace) -> int:
     """Every file, backend and reference; prints the rows as CSV where no folder is given."""
     from repair.io.destination import require_folder
+    from repair.reference.registry import names
     from repair.study.export import write_sweep
     from repair.study.rows import COLUMNS, SweepSettings
     from repair.study.run import sweep as run_sweep
@@ -55,7 +56,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     if not arguments.timeout > 0.0:
         raise UsageError(f"--timeout is {arguments.timeout:g} s; it has to be positive")
     for name in arguments.reference or []:
-        if name not in (known := reference_names()):
+        if name not in (known := names()):
             raise UsageError(f"reference {name!r} is none of {', '.join(known)}")
     settings = SweepSettings(
         backends=arguments.backend or ["ego"], references=arguments.reference or ["planner"],

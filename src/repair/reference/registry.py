@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repair.curves.base import Curve
-from repair.errors import ConfigError, ReferenceTrajectoryError, foreign
+from repair.errors import ConfigError, ReferenceTrajectoryError, foreign, in_words
 from repair.reference.base import Along, AsRecorded, MakeReference, ReferenceSource, Track
 from repair.reference.fit import deviation
 from repair.reference.recorded import known_until
@@ -20,7 +21,16 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
     from repair.world.boxes import Occupancy
 
-__all__ = ["SOURCES", "make_reference", "recording_of", "reference_notes", "register", "track_along"]
+__all__ = [
+    "SOURCES",
+    "make_reference",
+    "named",
+    "names",
+    "recording_of",
+    "reference_notes",
+    "register",
+    "track_along",
+]
 
 _FOLLOWED = (1e-3, 1e-2, 2e-3)  # what is followed to within less than this is followed [m], [m/s], [rad]
 _SPEED_OFF = 0.05  # a start this much faster or slower than the planning problem's is said [m/s]
@@ -72,6 +82,31 @@ def register(name: str, source: ReferenceSource | MakeReference) -> None:
         If the name is taken.
     """
     SOURCES.register(name, source if isinstance(source, ReferenceSource) else ReferenceSource(source))
+
+
+def names() -> tuple[str, ...]:
+    """The sources of references that need no file."""
+    return tuple(name for name in SOURCES.names() if name != "file")
+
+
+def named(text: str) -> dict[str, str]:
+    """The keys of the section ``reference`` that a word stands for: a source, or a CommonRoad solution file.
+
+    Raises
+    ------
+    ConfigError
+        If it is neither.
+    """
+    known = names()
+    if text in known:
+        return {"source": text}
+    try:
+        there = Path(text).is_file()
+    except (OSError, ValueError):  # a name that is too long, or none
+        there = False
+    if not there:
+        raise ConfigError(f"reference {in_words(text)} is neither one of {', '.join(known)} nor a file")
+    return {"source": "file", "file": Path(text).resolve().as_posix()}
 
 
 def track_along(scene: Scene, config: ReferenceConfig) -> Track | None:

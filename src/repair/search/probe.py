@@ -73,11 +73,14 @@ class TrajectoryChecker(Protocol):
 
 @dataclass
 class Budget:
-    """What is left of a time limit."""
+    """What is left of a time limit, and what is not worth spending it on."""
 
     limit: float | None
     begin: float
     clock: Callable[[], float]
+    hopeless: Callable[[float], bool] | None = (
+        None  # whether it is proven that nothing is feasible at a t_rep
+    )
     cut: bool = False  # the last probe would have gone on, had there been time
 
     @property

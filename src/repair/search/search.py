@@ -39,6 +39,7 @@ def iter_probes(
     clock: Callable[[], float] = time.perf_counter,
     visits: Sequence[float] | None = None,
     after: Probe | None = None,
+    hopeless: Callable[[float], bool] | None = None,
 ) -> Iterator[Probe]:
     """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
 
@@ -50,8 +51,10 @@ def iter_probes(
         The t_rep to visit [s] instead, whatever comes out.
     after : Probe, optional
         A feasible one: later t_rep are visited only, and its curve is where to start from.
+    hopeless : callable, optional
+        Says of a t_rep whether it is proven that nothing is feasible there.
     """
-    budget = Budget(settings.time_limit, clock(), clock)
+    budget = Budget(settings.time_limit, clock(), clock, hopeless if settings.proofs else None)
     made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
 
     def is_open(t_rep: float) -> bool:
@@ -137,12 +140,19 @@ def _visit(
     probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
     if probe.feasible:
         return probe
+    if _hopeless(t_rep, backend, budget):
+        return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
     tightens = any(source.notches)
     if tightens:
         probe = probe_again(
             probe, rejected, source,
             lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
         )  # fmt: skip
+    try:
+        if not probe.feasible and not budget.spent:  # cheaper than all margins, and mostly it is what helps
+            probe = _helped(probe, first, source, backend, checker, sides, budget)
+    except OutOfTime:
+        budget.cut = True
     # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow, and past larger ones
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
@@ -161,11 +171,20 @@ def _visit(
             again, _ = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
             tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
             probe = replace(again if again.feasible else probe, tried=tried)
-        if not probe.feasible and not budget.spent:
-            probe = _helped(probe, first, source, backend, checker, sides, budget)
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
+
+
+def _hopeless(t_rep: float, backend: RepairBackend, budget: Budget) -> bool:
+    """Whether it is proven that more of a backend that takes its time finds nothing at a t_rep either."""
+    can, left = backend.capabilities, budget.left
+    if budget.hopeless is None or not (can.relaxes or can.helpers) or (left is not None and left < _HELP):
+        return False
+    try:
+        return budget.hopeless(t_rep)
+    except OutOfTime:  # whoever goes on sees it
+        return False
 
 
 def _helped(
@@ -248,6 +267,7 @@ def search_f_ttr(
     visits: Sequence[float] | None = None,
     on_probe: Callable[[Probe], None] | None = None,
     after: Probe | None = None,
+    hopeless: Callable[[float], bool] | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
     """Algorithm 1 of the paper.
@@ -267,6 +287,8 @@ def search_f_ttr(
         Called after every probe; an interrupt in between loses nothing that was found.
     after : Probe, optional
         A feasible one: only later t_rep are visited, and its curve is where to start from.
+    hopeless : callable, optional
+        Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     clock : callable
         Monotonic time [s]; a parameter so that tests can bend it.
 
@@ -287,7 +309,7 @@ def search_f_ttr(
     probes: list[Probe] = []
     complete = True
     try:
-        for probe in iter_probes(source, backend, checker, end, settings, clock, visits, after):
+        for probe in iter_probes(source, backend, checker, end, settings, clock, visits, after, hopeless):
             probes.append(probe)
             if on_probe is not None:
                 on_probe(probe)

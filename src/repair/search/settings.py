@@ -42,6 +42,11 @@ class SearchConfig:
         "best: every open side of passing is tried; first: the first feasible one",
         choices=("best", "first"),
     )
+    proofs: bool = setting(
+        True,
+        "where nothing is found at first, and more would take long, a small proof that nothing can be found "
+        "is looked for; it never changes what is found",
+    )
 
 
 @dataclass

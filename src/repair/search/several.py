@@ -34,6 +34,7 @@ def search_with(
     around: ProblemSource | None = None,
     visits: Sequence[float] | None = None,
     too_late: Callable[[], float] | None = None,
+    hopeless: Callable[[float], bool] | None = None,
     on_probe: Callable[[Probe], None] | None = None,
 ) -> SearchResult:
     """Algorithm 1 with a backend, or with each member of one that is made of several.
@@ -56,6 +57,8 @@ def search_with(
         The times-to-repair to try [s].
     too_late : callable, optional
         From when on nobody finds anything [s]; asked once, when there is a repair and a member left.
+    hopeless : callable, optional
+        Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     on_probe : callable, optional
         Called after every probe.
 
@@ -64,7 +67,7 @@ def search_with(
     BackendError
         If a backend raises, or what it answers is no answer.
     """
-    found = _search_with(backend, name, situation, settings, around, visits, too_late, on_probe)
+    found = _search_with(backend, name, situation, settings, around, visits, too_late, hopeless, on_probe)
     fallbacks = backend.capabilities.fallbacks
     if fallbacks is None or visits is not None or found.status is not SearchStatus.NONE_FEASIBLE:
         return found
@@ -77,7 +80,7 @@ def search_with(
         again = search_f_ttr(
             around or (situation.unguided if other.capabilities.own_way else situation.source),
             situation.conflict, _Unaided(other, each, refused), situation.judge,
-            replace(settings, time_limit=left),
+            replace(settings, time_limit=left), hopeless=hopeless,
             on_probe=None if on_probe is None else partial(_told, on_probe, each),
         )  # fmt: skip
         refused[each] = {probe.t_rep for probe in again.probes}
@@ -141,6 +144,7 @@ def _search_with(
     around: ProblemSource | None,
     visits: Sequence[float] | None,
     too_late: Callable[[], float] | None,
+    hopeless: Callable[[float], bool] | None,
     on_probe: Callable[[Probe], None] | None,
 ) -> SearchResult:
     """As :func:`search_with`, without fallbacks."""
@@ -149,7 +153,7 @@ def _search_with(
         own = situation.unguided if one.capabilities.own_way else situation.source
         return search_f_ttr(
             around or own, situation.conflict, _Unaided(one, name, refused), situation.judge, settings,
-            visits=visits, on_probe=on_probe if several is None else by(name), after=best,
+            visits=visits, on_probe=on_probe if several is None else by(name), after=best, hopeless=hopeless,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:

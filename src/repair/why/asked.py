@@ -17,7 +17,7 @@ from repair.timegrid import INSTANT
 
 __all__ = ["REFERENCE", "Asked", "Cut", "Found"]
 
-_PROOF = 0.25  # processor time of a proof [s]: what takes longer mostly is none
+_PARTS = 100  # of a proof: what takes more mostly is none
 _CLOCK = 10.0  # times the processor time that is left, at most
 #: By whom a repair is found that is none: the reference itself meets nothing.
 REFERENCE = "reference"
@@ -103,7 +103,8 @@ class Asked:
             raise Cut
         if not self.proves or not self.t_rep < situation.conflict.time < math.inf:
             return None
-        settings = replace(situation.config.bound, time_limit=_PROOF)
+        usual = situation.config.bound
+        settings = replace(usual, nodes=min(usual.nodes, _PARTS))
         return proof_at(situation, self.t_rep, settings)
 
     def repair(self, situation: Prepared, *, proofs: bool = True) -> Found | None:

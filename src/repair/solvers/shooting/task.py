@@ -30,6 +30,7 @@ _ROUNDING = 1e-3  # share of the limits that is left to the rounding of curves
 _HISTORY = 120  # samples of the reference before t_rep, after which the body's angle is forgotten
 _MORE = 0.01  # and more of it, where that is too little
 _LITTLE = 0.01  # what counts as a miss and is none of a distance [m]
+_PROGRESS = 0.02  # share of what is left by which an iteration has to be better than those before it
 _EDGE = 0.05  # by which the lateral room is narrowed where a trajectory in it leaves the road [m]
 
 
@@ -107,7 +108,11 @@ class Task:
         return curve_of(self.problem, driven, self.exact)
 
     def search(self, plan: Plan) -> Shot:
-        """The best that is found; the search ends with the first iteration that finds one without excess."""
+        """The best that is found.
+
+        The search ends with the first iteration that finds one without excess, and where iterations no longer
+        come closer to one.
+        """
         rows = first_freely() if plan.steers else first_along()
         cost, deep, driven = self._cost(plan, rows)
         best = self._best(plan, rows, cost, deep, driven)
@@ -116,6 +121,7 @@ class Task:
         random = np.random.default_rng(self.config.seed)
         means = _apart(rows, cost, self.config.means)
         spreads = np.repeat(plan.spread[None], len(means), axis=0)
+        least, idle = np.array((best.miss, cost.min())), 0
         for _ in range(self.config.iterations):
             in_time()
             noise = random.standard_normal((len(means), self.config.population, plan.size))
@@ -127,6 +133,11 @@ class Task:
                 return found
             if found.miss < best.miss:
                 best = found
+            now = np.array((found.miss, cost.min()))
+            idle = 0 if (now < (1.0 - _PROGRESS) * least).any() else idle + 1
+            if idle == self.config.patience:
+                break
+            least = np.minimum(least, now)
             means, spreads = self._next(means, spreads, draws, cost)
         return best
 
