@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from repair.preparation import Prepared, prepare
     from repair.problem.problem import Maneuver, RepairProblem
     from repair.reference.registry import register as register_reference
+    from repair.report.style import FigureStyle
     from repair.save import register as register_format
     from repair.scene.commonroad import load_scene, scene_from_scenario, with_traffic
     from repair.scene.scene import Scene
@@ -72,6 +73,7 @@ __all__ = [
     "Conflict",
     "Cycle",
     "Explanation",
+    "FigureStyle",
     "FrenetTrajectory",
     "Maneuver",
     "Mitigation",
@@ -141,6 +143,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "repair.outcome.data": ("Outcome",),
     "repair.preparation": ("Prepared", "prepare"),
     "repair.io.result_json": ("load_result",),
+    "repair.report.style": ("FigureStyle",),
     "repair.problem.problem": ("Maneuver", "RepairProblem"),
     "repair.search.modes": ("ModeResult",),
     "repair.scene.commonroad": ("load_scene", "scene_from_scenario", "with_traffic"),

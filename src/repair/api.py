@@ -30,6 +30,7 @@ from repair.outcome.driven import driven_curve, what_is_driven
 from repair.outcome.known import what_is_known
 from repair.preparation import Phases, Prepared, among, prepare
 from repair.report.notebook import page_of
+from repair.report.style import FigureStyle
 from repair.report.text import headline
 from repair.save import Saved, saved
 from repair.scene.commonroad import load_scene, with_traffic
@@ -155,17 +156,16 @@ class RepairResult:
         """The content of ``result.json``."""
         return self.outcome.record
 
-    def saved(self, folder: str | Path, *, figure: bool = True) -> tuple[Outcome, list[Path]]:
+    def saved(self, folder: str | Path, *, figure: bool | FigureStyle = True) -> tuple[Outcome, list[Path]]:
         """Write the result into a folder; its outcome with the names of the files, and their paths."""
         target = path_of(folder, "the folder of a result", OutputError)
         require_folder(target)
-        made = Saved(
-            self.outcome, self.prepared.scene, self.states, self.status, figure, self.bounds, self.mitigation
-        )
+        outcome, scene = self.outcome, self.prepared.scene
+        made = Saved(outcome, scene, self.states, self.status, figure, self.bounds, self.mitigation)
         return saved(made, target)
 
-    def save(self, folder: str | Path, *, figure: bool = True) -> list[Path]:
-        """Write ``result.json``, the solution file, the figures and what they show into ``folder``.
+    def save(self, folder: str | Path, *, figure: bool | FigureStyle = True) -> list[Path]:
+        """Write ``result.json``, solution file, figures (``figure``: whether, and how) and what they show.
 
         Raises
         ------

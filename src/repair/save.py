@@ -23,6 +23,8 @@ from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_j
 from repair.mitigation.mitigate import Mitigation
 from repair.outcome.data import Outcome
 from repair.registry import Registry, loaded
+from repair.report.style import FORMATS as FIGURE_FORMATS
+from repair.report.style import FigureStyle, render
 from repair.scene.scene import Scene
 from repair.search.result import SearchStatus
 from repair.vehicle.parameters import VEHICLE_NAMES
@@ -30,7 +32,8 @@ from repair.vehicle.states import DrivenStates
 
 __all__ = ["FORMATS", "Files", "Format", "Saved", "register", "saved"]
 
-_FIGURES = ("profiles.png", "birdseye.png", "timeline.png")
+REPORT_FILE = "report.html"
+_FIGURES = ("profiles", "birdseye", "timeline")
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,8 @@ class Saved:
     states : DrivenStates
         What is driven, at the scenario's steps.
     status : SearchStatus
-    figures : bool
-        Whether figures are wanted.
+    figures : bool or FigureStyle
+        Whether figures are wanted, and how they are written.
     bounds : mapping
         From when on it is proven too late, by kind.
     mitigation : Mitigation or None
@@ -56,7 +59,7 @@ class Saved:
     scene: Scene
     states: DrivenStates
     status: SearchStatus
-    figures: bool
+    figures: bool | FigureStyle
     bounds: Mapping[str, Bound] = field(default_factory=dict)
     mitigation: Mitigation | None = None
 
@@ -122,17 +125,37 @@ def drawing_file(result: Saved) -> Files:
 
 def figure_files(result: Saved) -> Files:
     """The figures, where they are wanted."""
+    stale = tuple(f"{name}.{form}" for name in _FIGURES for form in FIGURE_FORMATS)
     if not result.figures:
-        return Files({}, {"figure_files": []}, _FIGURES)
+        return Files({}, {"figure_files": []}, stale)
+    style = FigureStyle() if result.figures is True else result.figures
     from repair.report.birdseye import birdseye_figure
     from repair.report.profiles import profile_figure
-    from repair.report.style import render
     from repair.report.timeline import timeline_figure
 
     drawing = (profile_figure, birdseye_figure, timeline_figure)
-    made = {name: draw(result.outcome) for name, draw in zip(_FIGURES, drawing, strict=True)}
-    drawn = {name: render(figure) for name, figure in made.items() if figure is not None}
-    return Files(drawn, {"figure_files": list(drawn)}, _FIGURES)
+    made = {name: draw(result.outcome, style) for name, draw in zip(_FIGURES, drawing, strict=True)}
+    drawn = {
+        f"{name}.{style.format}": render(figure, style.format)
+        for name, figure in made.items()
+        if figure is not None
+    }
+    return Files(drawn, {"figure_files": list(drawn)}, stale)
+
+
+def report_file(result: Saved) -> Files:
+    """The page of the result, where figures are wanted; without Plotly the record says why there is none."""
+    none: dict[str, Any] = {"report_file": None}
+    if not result.figures:
+        return Files({}, none, (REPORT_FILE,))
+    from repair.report.page.html import PlotlyMissing
+    from repair.report.page.one import result_page
+
+    try:
+        page = result_page(result.outcome)
+    except PlotlyMissing as error:
+        return Files({}, none | {"report_file_problem": str(error)}, (REPORT_FILE,))
+    return Files({REPORT_FILE: page.encode("utf-8", "backslashreplace")}, {"report_file": REPORT_FILE})
 
 
 def scenario_file(result: Saved) -> Files:
@@ -166,6 +189,7 @@ FORMATS: Registry[Format] = Registry(
         "solution": solution_file,
         "mitigation": mitigation_file,
         "figures": figure_files,
+        "report": report_file,
         "scenario": scenario_file,
         "drawing": drawing_file,
         "proof": proof_file,

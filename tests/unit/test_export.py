@@ -341,7 +341,7 @@ def test_figures_are_drawn_without_global_state(found: RepairResult) -> None:
     before = "matplotlib.pyplot" in sys.modules
     figure = profile_figure(found.outcome)
     assert [a.get_ylabel().replace("\n", " ") for a in figure.axes] == [
-        "distance driven s [m]", "speed [m/s]", "acceleration [m/s²]",
+        "distance driven s [m]", "speed [m/s]", "acceleration [m/s²]", "lateral acc. [m/s²]",
     ]  # fmt: skip
     assert figure.axes[-1].get_xlabel() == "time t [s]"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -393,7 +393,7 @@ def test_the_record_of_a_folder_is_its_file(found: RepairResult, folder: Path) -
     outcome = load_result(folder)
     assert outcome.record == strict((folder / "result.json").read_text("utf-8")) == read_record(folder)
     assert load_result(str(folder)).record == outcome.record
-    files = ("solution_file", "figure_files", "scenario_file", "drawing_file")
+    files = ("solution_file", "figure_files", "report_file", "scenario_file", "drawing_file")
     assert {**outcome.record, **dict.fromkeys(files)} == {**found.to_dict(), **dict.fromkeys(files)}
     assert all(outcome.record[name] for name in files)
     assert (outcome.scenario, outcome.backend, outcome.status) == (found.prepared.scene.id, "ego", "found")
@@ -565,7 +565,7 @@ def test_a_result_of_an_earlier_version_is_certified(copied: Path) -> None:
 
 
 def test_every_format_names_its_files(found: RepairResult, tmp_path: Path) -> None:
-    assert FORMATS.names() == ("solution", "mitigation", "figures", "scenario", "drawing", "proof")
+    assert FORMATS.names() == ("solution", "mitigation", "figures", "report", "scenario", "drawing", "proof")
 
     def text(result: Any) -> Files:
         return Files({f"{result.name}.txt": b"mine"}, {"text_file": f"{result.name}.txt"}, ("old.txt",))

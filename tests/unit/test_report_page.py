@@ -190,7 +190,7 @@ def test_the_page_of_one_result(tmp_path, capsys):
     file.write_text(roads.scenario(), encoding="utf-8")
     repair.repair(file, overrides=["reference.source=constant"]).save(tmp_path / "out", figure=False)
     assert main(["report", str(tmp_path / "out"), "--out", str(tmp_path / "page.html")]) == 0
-    assert "1 rows of 1 scenarios: 1 repaired" in (tmp_path / "page.html").read_text("utf-8")
+    assert "One result: found." in (tmp_path / "page.html").read_text("utf-8")
     capsys.readouterr()
     assert main(["report", str(tmp_path)]) == 2
     assert "holds no result.json" in capsys.readouterr().err

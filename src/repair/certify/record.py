@@ -20,7 +20,7 @@ __all__ = ["Again", "differences", "other_versions", "record_rows", "searched_ag
 #: What a run is free to differ in: times of the clock, versions, names of files, iterations.
 _FREE = frozenset(
     {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
-     "scenario_file_problem", "modes", "drawing_file", "provenance",
+     "scenario_file_problem", "report_file", "report_file_problem", "modes", "drawing_file", "provenance",
      "config", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound", "explanation"}
 )  # fmt: skip
 #: What follows from the scenario, the configuration and the curve alone. Not how it ends: a stop is driven on

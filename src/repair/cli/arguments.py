@@ -10,8 +10,11 @@ from repair.errors import RepairError
 
 if TYPE_CHECKING:
     from repair.config import Config
+    from repair.report.style import FigureStyle
 
-__all__ = ["UsageError", "configuration_arguments", "no_arguments", "resolve"]
+__all__ = [
+    "UsageError", "configuration_arguments", "figure_arguments", "figure_style", "no_arguments", "resolve",
+]  # fmt: skip
 
 # For --help alone, which loads no registry; `repair config --table` lists what is registered too.
 _USUAL = "planner, constant, accelerate, recorded"
@@ -54,6 +57,22 @@ def resolve(arguments: argparse.Namespace) -> Config:
 def _quoted(text: str) -> str:
     """A text as YAML: a path may hold what that takes for something else."""
     return "'" + text.replace("'", "''") + "'"
+
+
+def figure_arguments(parser: argparse.ArgumentParser) -> None:
+    """``--format``, ``--width`` and ``--font-size``."""
+    parser.add_argument("--format", choices=("png", "pdf", "svg"), help="of the figures (default: png)")
+    parser.add_argument("--width", type=float, metavar="IN", help="of the figures, in inches (default: 8)")
+    parser.add_argument("--font-size", type=float, metavar="PT", help="in the figures (default: 9.5)")
+
+
+def figure_style(arguments: argparse.Namespace) -> FigureStyle | None:
+    """How figures are to be written; None where nothing is said of it."""
+    from repair.report.style import FigureStyle
+
+    names = ("format", "width", "font_size")
+    said = {name: value for name in names if (value := getattr(arguments, name)) is not None}
+    return FigureStyle(**said) if said else None
 
 
 def no_arguments(parser: argparse.ArgumentParser) -> None:

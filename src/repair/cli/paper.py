@@ -7,6 +7,7 @@ import os
 import sys
 from pathlib import Path
 
+from repair.cli.arguments import figure_arguments, figure_style
 from repair.paper.bundled import PAPER_SCENARIOS
 
 
@@ -65,7 +66,7 @@ def figures_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``repair figures``."""
     parser.add_argument("--backend", metavar="NAME", default="ego")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("figures"), help="default: figures")
-    parser.add_argument("--format", choices=("png", "pdf", "svg"), default="png")
+    figure_arguments(parser)
 
 
 def figures(arguments: argparse.Namespace) -> int:
@@ -75,6 +76,6 @@ def figures(arguments: argparse.Namespace) -> int:
     from repair.paper.figures import paper_figures
 
     require_folder(arguments.out)
-    for path in write_files(arguments.out, paper_figures(arguments.backend, arguments.format)):
+    for path in write_files(arguments.out, paper_figures(arguments.backend, figure_style(arguments))):
         print(path)
     return 0

@@ -11,7 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from repair.cli.arguments import configuration_arguments, resolve
+from repair.cli.arguments import (
+    UsageError,
+    configuration_arguments,
+    figure_arguments,
+    figure_style,
+    resolve,
+)
 from repair.cli.streams import as_json
 from repair.errors import RepairError
 from repair.paper.bundled import OFFICIAL_FILES, PAPER_SCENARIOS, find_scenario, paper_scenario
@@ -47,7 +53,8 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to-goal", action="store_true", help="go on until the planning problem's goal is reached"
     )
-    parser.add_argument("--no-figure", action="store_true", help="leave the figures out")
+    parser.add_argument("--no-figure", action="store_true", help="leave the figures and the page out")
+    figure_arguments(parser)
 
 
 @contextmanager
@@ -120,10 +127,13 @@ def _progress(after: float = 2.0) -> Callable[[str], None]:
 
 def run(arguments: argparse.Namespace) -> int:
     """One scenario; the result on stdout, and in files where a folder is given."""
+    style = figure_style(arguments)
     if arguments.out is not None:
         from repair.io.destination import require_folder
 
         require_folder(arguments.out)
+    if style is not None and (arguments.out is None or arguments.no_figure):
+        raise UsageError("--format, --width and --font-size say how figures are written; they need --out DIR")
     with _Interrupts() as interrupts, _scenario(arguments) as (path, config):
         from repair.api import repair
         from repair.io.result_json import to_json
@@ -135,7 +145,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out is not None:
             interrupts.ignored = 1.0
             try:
-                outcome, written = result.saved(arguments.out, figure=not arguments.no_figure)
+                outcome, written = result.saved(arguments.out, figure=style or not arguments.no_figure)
                 content = outcome.record
             except RepairError as error:
                 problem = error

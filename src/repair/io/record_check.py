@@ -181,6 +181,8 @@ _OTHERS: dict[str, Test] = {
     "capabilities": lambda value: isinstance(value, dict),
     "solution_file": _maybe(_text),
     "figure_files": _list_of(_text),
+    "report_file": _maybe(_text),
+    "report_file_problem": _text,
     "scenario_file": _maybe(_text),
     "drawing_file": _maybe(_text),
     "checks_off": _list_of(_text),

@@ -143,6 +143,7 @@ def record_of(
         ],
         "solution_file": None,
         "figure_files": [],
+        "report_file": None,
         "scenario_file": None,
         "drawing_file": None,
         "time_s": {name: number(seconds, 6) for name, seconds in phases.items()},

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from repair.arrays import Array
 from repair.errors import OutputError
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Drawing, Line, Outcome
 from repair.report.style import EGO, OBSTACLE, REFERENCE
 from repair.timegrid import STEP
 
-__all__ = ["Styled", "continuation_lines", "drawing_in", "reference_line", "repair_lines", "title_of"]
+__all__ = [
+    "Styled", "continuation_lines", "drawing_in", "lateral_acceleration", "reference_line", "repair_lines",
+    "title_of",
+]  # fmt: skip
+
+_NAMED = 8  # so many times-to-repair have a line each in a legend
+_REACH = 0.05  # differences are taken so far to either side [s]
+_RESTS = 0.5  # who is slower has no lateral acceleration that could be told from its path [m/s]
 
 
 @dataclass(frozen=True)
@@ -79,10 +87,22 @@ def repair_lines(outcome: Outcome) -> list[Styled]:
         )
     pairs = sorted(zip(curves, probes, strict=True), key=lambda pair: pair[0].t_rep or 0.0)
     shades: Any = np.linspace(0.08, 0.86, max(len(pairs), 2))[-len(pairs) :] if pairs else []
-    return [
+    made = [
         _styled(outcome, *pair, colormaps["viridis"](shade))
         for pair, shade in zip(pairs, shades, strict=True)
     ]
+    return _named(made)
+
+
+def _named(lines: list[Styled]) -> list[Styled]:
+    """Of very many only the first, the best, the one after it and the last are named."""
+    if len(lines) <= _NAMED:
+        return lines
+    best = next((k for k, x in enumerate(lines) if "F-TTR" in x.label), 0)
+    kept = {0, best, best + 1, len(lines) - 1}
+    others = [k for k in range(len(lines)) if k not in kept]
+    labels = dict.fromkeys(others, "_") | {others[0]: f"{len(others)} others between"}
+    return [replace(x, label=labels.get(k, x.label)) for k, x in enumerate(lines)]
 
 
 def _has_curve(probe: dict[str, Any], curves: list[Line]) -> bool:
@@ -96,8 +116,35 @@ def _styled(outcome: Outcome, line: Line, probe: dict[str, Any], colour: Any) ->
     if not probe["feasible"]:
         verdict = "\n" + ", ".join(probe["reasons"]).replace("_", " ")
     style = {"color": colour, "lw": 2.4 if best else 1.5, "ls": "-" if probe["feasible"] else (0, (4, 2))}
-    label = f"$t_{{rep}}$ = {probe['t_rep_s']:g} s{verdict}"
+    by = probe.get("backend")
+    other = f", {by}" if by and by != outcome.backend else ""
+    label = f"$t_{{rep}}$ = {probe['t_rep_s']:g} s{other}{verdict}"
     return Styled(line, label, style, bool(probe["feasible"]))
+
+
+def lateral_acceleration(line: Line) -> Array:
+    """Lateral acceleration (K,) at the samples [m/s²], to the left: speed by the turning rate of the path.
+
+    By differences over about 0.1 s: places are rounded to a tenth of a millimetre.
+    """
+    count = len(line.t)
+    if count < 5:
+        return np.zeros(count)
+    step = float(line.t[-1] - line.t[0]) / (count - 1)
+    reach = int(np.clip(round(_REACH / step), 1, (count - 1) // 4))
+    k = np.arange(count)
+    before, after = np.maximum(k - reach, 0), np.minimum(k + reach, count - 1)
+
+    def rate(values: Array) -> Array:
+        return np.asarray((values[after] - values[before]) / (line.t[after] - line.t[before]))
+
+    dx, dy = rate(line.x), rate(line.y)
+    speed = np.hypot(dx, dy)
+    heading = np.unwrap(np.arctan2(dy, dx))
+    made: Array = np.where(speed > _RESTS, speed * rate(heading), 0.0)
+    ends = 2 * reach  # one-sided differences of one-sided differences are no accelerations
+    made[:ends], made[-ends:] = made[ends], made[-ends - 1]
+    return made
 
 
 def continuation_lines(outcome: Outcome) -> list[Styled]:

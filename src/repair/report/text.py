@@ -51,8 +51,12 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     lines += [f"{'Note' if k == 0 else '':9} {note}" for k, note in enumerate(grouped(content["notes"]))]
     if written:
         lines += [f"{'Files' if k == 0 else '':9} {path}" for k, path in enumerate(written)]
+        if (why := content.get("report_file_problem")) is not None:
+            lines.append(f"{'':9} no report.html: {why}")
     else:
-        lines.append("Files     none written; --out DIR writes result.json, the solution file and figures")
+        lines.append(
+            "Files     none written; --out DIR writes result.json, the solution file, figures and a page"
+        )
     return "\n".join(lines)
 
 

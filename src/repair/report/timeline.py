@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Outcome
 from repair.report.lines import title_of
-from repair.report.style import STYLE, WIDTH
+from repair.report.style import FigureStyle
 
 __all__ = ["Part", "parts_of", "text_bar", "timeline_figure", "timeline_rows"]
 
@@ -78,10 +78,15 @@ def timeline_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [("Timeline", f"0 |{bar}| {ttc:.2f} s ({legend})")]
 
 
-def timeline_figure(outcome: Outcome) -> Any:
+def timeline_figure(outcome: Outcome, style: FigureStyle | None = None) -> Any:
     """F-TTR, gap and bound over the time until the conflict, a bar for each kind of bound.
 
     Ticks below the bars are the times-to-repair that were visited.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    style : FigureStyle, optional
 
     Returns
     -------
@@ -98,9 +103,11 @@ def timeline_figure(outcome: Outcome) -> Any:
     from matplotlib.patches import Patch
 
     kinds = bound["kinds"]
-    style = {**STYLE, "hatch.linewidth": 0.6, "axes.grid": False, "axes.spines.left": False}
-    with rc_context(style):
-        figure = Figure(figsize=(WIDTH, 1.5 + 0.55 * len(kinds)), layout="constrained")
+    style = style or FigureStyle()
+    look = {**style.rc, "hatch.linewidth": 0.6, "axes.grid": False, "axes.spines.left": False}
+    with rc_context(look):
+        size = style.width, (1.5 + 0.55 * len(kinds)) * max(style.width / 8.0, 0.7)
+        figure = Figure(figsize=size, layout="constrained")
         axes = figure.add_subplot()
         for row, one in enumerate(kinds.values()):
             for part in parts_of(record["f_ttr_s"], one["t_bound_s"], ttc):
@@ -134,7 +141,9 @@ def _length(axes: Any, part: Part, row: float, ttc: float) -> None:
         return
     box = {"boxstyle": "square,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
     middle = 0.5 * (part.begin + part.end)
-    axes.text(middle, row, f"{part.end - part.begin:.3g} s", ha="center", va="center", fontsize=8, bbox=box)
+    axes.text(
+        middle, row, f"{part.end - part.begin:.3g} s", ha="center", va="center", fontsize="small", bbox=box
+    )
 
 
 def _ticks(axes: Any, record: Mapping[str, Any], height: float) -> None:
@@ -148,7 +157,7 @@ def _ticks(axes: Any, record: Mapping[str, Any], height: float) -> None:
             )
     if found or missed:
         place = {"loc": "upper left", "bbox_to_anchor": (1.0, 0.25)}
-        axes.legend(**place, frameon=False, fontsize=8, handletextpad=0.1)
+        axes.legend(**place, frameon=False, fontsize="small", handletextpad=0.1)
 
 
 def _marks(axes: Any, record: Mapping[str, Any], ttc: float) -> None:
@@ -160,5 +169,5 @@ def _marks(axes: Any, record: Mapping[str, Any], ttc: float) -> None:
         near = side == "center" and (time < 0.12 * ttc or time > 0.75 * ttc)
         side = ("left" if time < 0.12 * ttc else "right") if near else side
         height = 0.62 if side == "right" and time >= ttc else 0.42
-        axes.text(time, height, words, ha=side, va="bottom", fontsize=8.5)
+        axes.text(time, height, words, ha=side, va="bottom", fontsize="small")
         axes.plot([time] * 2, [0.3, 0.44], color="#000000", lw=1.0)

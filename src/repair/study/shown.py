@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from repair.errors import RepairError
-from repair.io.drawing_json import drawing_to_dict
 from repair.io.result_json import load_result
 from repair.report.page.html import study_page
+from repair.report.page.one import result_page
 from repair.study.plan import package_version
-from repair.study.rows import STUDY_COLUMNS
 from repair.study.store import Store
 from repair.study.task import unpacked
 
@@ -54,19 +53,4 @@ def page_of_result(folder: Path) -> str:
     RepairError
         If there is none, or Plotly is missing.
     """
-    outcome = load_result(folder)
-    record = outcome.record
-    row: dict[str, Any] = {name: record.get(name) for name in STUDY_COLUMNS}
-    conflict, source = record["conflict"], record["provenance"]
-    row.update({name: conflict[name] for name in ("obstacle_id", "margin_only", "from_behind")})
-    row.update(
-        file=source["name"] or record["scenario"], reference=record["config"]["reference"]["source"],
-        conflict=conflict["kind"], search_time_s=record["time_s"].get("search"), detail="", variation="",
-        probes=" ".join(f"{p['t_rep_s']:g}:{'-'.join(('', *p['reasons'])) or '+'}" for p in record["probes"]),
-    )  # fmt: skip
-    whole = {
-        "record": record,
-        "drawing": None if outcome.drawing is None else drawing_to_dict(outcome.drawing),
-    }
-    told = {"command": "repair run", "versions": "\n".join(f"{k} {v}" for k, v in record["versions"].items())}
-    return study_page([row], [whole], told, {row["file"]: source["sha256"] or ""})
+    return result_page(load_result(folder))

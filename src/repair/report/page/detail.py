@@ -10,12 +10,11 @@ import numpy as np
 from repair.arrays import Array
 from repair.io.drawing_json import drawing_from
 from repair.outcome.data import Drawing, Line
+from repair.report.lines import lateral_acceleration
 
 __all__ = ["case_of", "detail_of"]
 
 _POINTS = 70  # of a curve
-_ENDS = 2  # samples at either end without neighbours enough for a second derivative
-_RESTS = 0.5  # who is slower has no lateral acceleration that could be told from its path [m/s]
 
 
 def detail_of(record: Mapping[str, Any], drawing: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -98,7 +97,7 @@ def _line(line: Line, reference: Line) -> dict[str, Any]:
     columns = {
         "t": line.t, "s": line.s, "l": line.l, "x": line.x, "y": line.y, "v": line.speed,
         "a": line.acceleration,
-        "across": _lateral(line), "beside": beside,
+        "across": lateral_acceleration(line), "beside": beside,
     }  # fmt: skip
     return {
         "kind": line.kind,
@@ -106,21 +105,6 @@ def _line(line: Line, reference: Line) -> dict[str, Any]:
         "t_rep": line.t_rep,
         **{name: _plain(values[keep]) for name, values in columns.items()},
     }
-
-
-def _lateral(line: Line) -> Array:
-    """Lateral acceleration [m/s²] along the samples: the speed times the rate of the path's direction."""
-    if len(line.t) < 3:
-        return np.zeros(len(line.t))
-    dx, dy = np.gradient(line.x, line.t), np.gradient(line.y, line.t)
-    speed = np.hypot(dx, dy)
-    ddx, ddy = np.gradient(dx, line.t), np.gradient(dy, line.t)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = (dx * ddy - dy * ddx) / speed
-    made: Array = np.where(speed > _RESTS, found, 0.0)
-    if len(made) > 2 * _ENDS:  # one-sided differences of differences are no accelerations
-        made[:_ENDS], made[-_ENDS:] = made[_ENDS], made[-_ENDS - 1]
-    return made
 
 
 def _poses(drawn: Drawing) -> list[list[float]]:

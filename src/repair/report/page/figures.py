@@ -28,7 +28,9 @@ def _groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def verdict(rows: Sequence[Row]) -> str:
-    """The whole study in a sentence."""
+    """The whole study in a sentence; of one result, what is said below is not said twice."""
+    if len(rows) == 1:
+        return f"One result: {rows[0]['status']}."
     status = Counter(row["status"] for row in rows)
     broken = sum(status[word] for word in _BROKEN)
     rest = len(rows) - status["found"] - status["no_conflict"] - broken

@@ -10,17 +10,21 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from repair.errors import RepairError
+from repair.errors import OutputError
 from repair.report.page.detail import case_of, detail_of
 from repair.report.page.figures import figures_of, summary_of, verdict
 
-__all__ = ["study_page"]
+__all__ = ["PlotlyMissing", "study_page"]
 
 _HERE = Path(__file__).parent
 _SHOWN = (
     "file", "reference", "backend", "variation", "status", "conflict", "ttc_s", "ttr_s", "f_ttr_s",
     "maneuver", "repaired_by", "ending", "search_time_s", "certificate", "detail",
 )  # fmt: skip
+
+
+class PlotlyMissing(OutputError):
+    """The library that draws the page is not installed."""
 
 
 def study_page(
@@ -44,7 +48,7 @@ def study_page(
 
     Raises
     ------
-    RepairError
+    PlotlyMissing
         If Plotly is not installed.
     """
     script = _plotly()
@@ -71,7 +75,8 @@ def study_page(
         "figures": figures,
     }
     return _text("page.html").format(
-        style=_text("page.css"), verdict=escape(verdict(rows)), about=_about(about, files),
+        style=_text("page.css"), kind="one" if len(rows) == 1 else "many",
+        verdict=escape(verdict(rows)), about=_about(about, files),
         summary=_table(head, body), figures=_figures(figures), plotly=_in_script(script),
         data=_in_script(json.dumps(data, allow_nan=False, separators=(",", ":"))), script=_text("page.js"),
     )  # fmt: skip
@@ -81,7 +86,7 @@ def _plotly() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
-        raise RepairError(
+        raise PlotlyMissing(
             f"a report needs the package plotly: pip install 'commonroad-repair[report]' ({error})"
         ) from error
     return str(get_plotlyjs())

@@ -4,8 +4,8 @@
   const by = (id) => document.getElementById(id);
   const look = { responsive: true, displayModeBar: false };
   const base = {
-    margin: { l: 52, r: 12, t: 12, b: 44 }, paper_bgcolor: "white", plot_bgcolor: "white", hovermode: "closest",
-    legend: { orientation: "h", y: -0.34 }, font: { size: 12 },
+    margin: { l: 56, r: 12, t: 12, b: 84 }, paper_bgcolor: "white", plot_bgcolor: "white", hovermode: "closest",
+    legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0, font: { size: 11 } }, font: { size: 12 },
   };
   const axis = (title, more) => Object.assign({ title: { text: title }, gridcolor: "#eee", zerolinecolor: "#ccc" }, more);
 
@@ -93,6 +93,16 @@
     one = detail;
     road = around;
     by("detail-sentence").textContent = one.sentence;
+    by("facts").replaceChildren(...data.columns.flatMap((column, j) => {
+      if (texts[k][j] === "" || ["file", "reference", "detail"].includes(column)) return [];
+      const pair = document.createElement("div");
+      for (const [tag, text] of [["dt", column], ["dd", texts[k][j]]]) {
+        const part = document.createElement(tag);
+        part.textContent = text;
+        pair.append(part);
+      }
+      return [pair];
+    }));
     by("notes").replaceChildren(...one.notes.map((note) => {
       const item = document.createElement("li");
       item.textContent = note;
@@ -111,8 +121,35 @@
     slider.max = Math.max(one.repairs.length - 1, 0);
     slider.value = best < 0 ? 0 : best;
     slider.disabled = one.repairs.length < 2;
+    const reference = one.lines.find((each) => each.kind === "reference");
+    // Where the reference goes far, the few metres that decide are nothing to be seen.
+    by("relative").checked = Boolean(reference) && one.lines.length > 1 && reference.s.at(-1) - reference.s[0] > 50;
     draw();
     if (scroll) by("detail").scrollIntoView({ behavior: "smooth", block: "start" });
+  }
+
+  // The value at a time between those that are there; null outside of them.
+  function between(times, values, t) {
+    const last = times.length - 1;
+    if (t < times[0] - 1e-9 || t > times[last] + 1e-9) return null;
+    let k = times.findIndex((each) => each >= t);
+    if (k < 1) return k === 0 ? values[0] : values[last];
+    const share = (t - times[k - 1]) / Math.max(times[k] - times[k - 1], 1e-9);
+    return values[k - 1] + share * (values[k] - values[k - 1]);
+  }
+
+  // Shortly before a repair is somewhere else than the reference; 0 where the way there is short.
+  function begins(reference) {
+    if (reference.s.at(-1) - reference.s[0] < 50 || one.ttc === null || !one.repairs.length) return 0;
+    const left = one.repairs.map((line) => line.t.find((t, k) =>
+      Math.hypot(line.s[k] - at(reference, t), line.beside[k]) > 0.5)).filter((t) => t !== undefined);
+    return Math.max(Math.min(one.f_ttr ?? one.ttc, one.ttc, ...left) - 1, 0);
+  }
+
+  // Where the reference is at a time; after its end it keeps its speed.
+  function at(reference, t) {
+    const inside = between(reference.t, reference.s, t);
+    return inside !== null ? inside : reference.s.at(-1) + reference.v.at(-1) * (t - reference.t.at(-1));
   }
 
   function verdictOf(line) {
@@ -137,16 +174,20 @@
       one.lines.filter((each) => each.kind === "continuation" || each.kind === "onward") : [];
     const name = chosen ? (good ? "repair" : "rejected") + ", " + chosen.t_rep.toFixed(2) + " s" : "";
 
+    const moving = by("relative").checked;
+    const shown = (t, s) => moving ? s - at(reference, t) : s - one.start;
+    const placed = (line) => line.s.map((s, k) => shown(line.t[k], s));
     function curves(column, more) {
+      const valued = (each) => column === "s" ? placed(each) : each[column];
       const made = one.repairs.filter((each) => each !== chosen).map((each) => ({
-        x: each.t, y: each[column], mode: "lines", line: { color: "#c8c8c8", width: 1 }, showlegend: false,
+        x: each.t, y: valued(each), mode: "lines", line: { color: "#c8c8c8", width: 1 }, showlegend: false,
         hovertemplate: "t_rep " + each.t_rep.toFixed(2) + " s<extra></extra>",
       }));
-      made.push({ x: reference.t, y: reference[column], mode: "lines", name: "reference",
+      made.push({ x: reference.t, y: valued(reference), mode: "lines", name: "reference",
         line: { color: "#555", dash: "dash", width: 1.5 } });
-      if (chosen) made.push({ x: chosen.t, y: chosen[column], mode: "lines", name: name, line: { color: colour, width: 2.5 } });
+      if (chosen) made.push({ x: chosen.t, y: valued(chosen), mode: "lines", name: name, line: { color: colour, width: 2.5 } });
       for (const each of after) {
-        made.push({ x: each.t, y: each[column], mode: "lines", name: each.kind === "onward" ? "onward" : "stop after it",
+        made.push({ x: each.t, y: valued(each), mode: "lines", name: each.kind === "onward" ? "onward" : "stop after it",
           line: { color: colour, width: 1.5, dash: "dot" } });
       }
       return made.concat(more || []);
@@ -169,22 +210,32 @@
     const half = one.length / 2, others = [];
     for (const box of road ? road.boxes : []) {
       box.runs.forEach((run) => others.push({
-        x: run[0].concat(run[0].slice().reverse()), y: run[1].concat(run[2].slice().reverse()), fill: "toself",
+        x: run[0].concat(run[0].slice().reverse()),
+        y: [run[1], run[2].slice().reverse()].flatMap((ends, j) =>
+          ends.map((s, k) => shown(run[0][j ? run[0].length - 1 - k : k], s))),
+        fill: "toself",
         mode: "lines", line: { color: "#444", width: 1 }, fillcolor: "rgba(60,60,60,0.55)", showlegend: false,
         hoverinfo: "text", text: "obstacle " + box.id,
       }));
     }
     const on = chosen || reference;
+    const middle = placed(on);
     const band = { x: on.t.concat(on.t.slice().reverse()),
-      y: on.s.map((s) => s + half).concat(on.s.map((s) => s - half).reverse()), fill: "toself", mode: "none",
+      y: middle.map((s) => s + half).concat(middle.map((s) => s - half).reverse()), fill: "toself", mode: "none",
       fillcolor: chosen ? (good ? "rgba(0,114,178,0.22)" : "rgba(213,94,0,0.22)") : "rgba(90,90,90,0.2)", name: "the ego's length", hoverinfo: "skip" };
-    const aside = on.s.map((s, k) => Math.abs(on.beside[k]) > one.width / 2 ? s : null);
+    // Where the picture has the ego on somebody, and the check has not: it is beside it.
+    const free = chosen ? good : one.status === "no_conflict";
+    const overlaps = (k) => (road ? road.boxes : []).some((box) => box.runs.some((run) => {
+      const low = between(run[0], run[1], on.t[k]), high = between(run[0], run[2], on.t[k]);
+      return low !== null && on.s[k] + half > low && on.s[k] - half < high;
+    }));
+    const aside = middle.map((s, k) => free && overlaps(k) ? s : null);
     const beside = { x: on.t, y: aside, mode: "markers", marker: { symbol: "circle-open", size: 7, color: colour },
-      name: "more than half its width beside the reference: see the next figure", hoverinfo: "skip" };
-    const seen = one.lines.filter((each) => each.kind !== "continuation" && each.kind !== "onward").flatMap((each) => each.s);
+      name: "beside it, as from above: no contact", hoverinfo: "skip" };
+    const seen = one.lines.filter((each) => each.kind !== "continuation" && each.kind !== "onward").flatMap(placed);
     const low = Math.min(...seen) - half, high = Math.max(...seen) + half, room = 0.06 * (high - low) + 1;
-    panel("plot-s", "s [m]", others.concat([band], curves("s"), aside.some((s) => s !== null) ? [beside] : []),
-      { range: [low - room, high + room] });
+    panel("plot-s", moving ? "ahead of the reference [m]" : "distance driven [m]", others.concat([band], curves("s"), aside.some((s) => s !== null) ? [beside] : []),
+      { range: [low - Math.max(room, half), high + Math.max(room, half)] });
     panel("plot-l", "l [m], left is positive", curves("l"));
     panel("plot-v", "v [m/s]", curves("v", limit(one.limits.v_max, "largest speed")), speedRange());
     panel("plot-a", "a [m/s²]", curves("a", limit(one.limits.a_min, "smallest").concat(limit(one.limits.a_max, "largest"))));
@@ -234,12 +285,14 @@
     traces.push(filled([corners.map(([a, b]) => on.x[k] + a * Math.cos(w) - b * Math.sin(w)),
       corners.map(([a, b]) => on.y[k] + a * Math.sin(w) + b * Math.cos(w))], "rgba(0,114,178,0.5)", colour, "the ego",
       "the ego, all at " + on.t[k].toFixed(1) + " s"));
-    const xs = one.lines.flatMap((each) => each.x), ys = one.lines.flatMap((each) => each.y);
+    const from = begins(reference), kept = (column) => one.lines.flatMap((each) => each[column].filter((_, k) => each.t[k] >= from));
+    const xs = kept("x"), ys = kept("y");
     Plotly.react(by("plot-bird"), traces, Object.assign({}, base, {
       xaxis: axis("x [m]", { range: [Math.min(...xs) - 8, Math.max(...xs) + 8] }),
       yaxis: axis("y [m]", { range: [Math.min(...ys) - 8, Math.max(...ys) + 8], scaleanchor: "x" }) }), look);
   }
 
+  by("relative").addEventListener("change", () => { if (one) draw(); });
   by("slider").addEventListener("input", () => { if (one) draw(); });
   const first = data.details.findIndex((each) => each !== null);
   if (first >= 0) choose(first, false);
