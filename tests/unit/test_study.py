@@ -235,6 +235,27 @@ def test_a_store_of_another_version_is_refused(tmp_path):
         Store(tmp_path / "nowhere", readonly=True)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="locks of files")
+def test_one_study_at_a_time_in_a_folder(folder, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "out"
+    hold = "from pathlib import Path; import sys, time; from repair.study.store import Store; "
+    hold += "store = Store(Path(sys.argv[1])); print('there', flush=True); time.sleep(600)"
+    argv = ["study", str(written(tmp_path, f"scenarios: {folder}\n")), "--out", str(out), "--resume"]
+    monkeypatch.setattr("repair.study.engine.LocalLanes", lambda count: Here("one"))
+    with subprocess.Popen([sys.executable, "-c", hold, str(out)], stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline().strip() == b"there"
+        for words in (argv, ["sweep", str(folder), "--out", str(out)]):
+            assert main(words) == 2
+            told = capsys.readouterr().err
+            assert f"a study in {out} is running already (process {other.pid} on " in told
+        assert main([*argv, "--dry-run"]) == 0  # who only looks may look
+        other.send_signal(signal.SIGKILL)
+        other.wait()
+    assert main(argv) == 0
+    assert main(argv) == 0
+
+
 def test_exported_rows_hold_what_is_stored(study, tmp_path, capsys):
     filled(replace(study, backends=("ego",)), tmp_path, 3)
     assert main(["study", "export", str(tmp_path)]) == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,9 +85,8 @@ def _run(arguments: argparse.Namespace, chosen: Study) -> int:
         return 0
     lanes: Lanes
     lanes = ClusterLanes(arguments.dask) if arguments.dask is not None else LocalLanes(workers)
-    with Store(out) as store:
+    with closing(lanes), Store(out) as store:
         if not arguments.resume and store.done():
-            lanes.close()
             raise UsageError(f"{out} holds rows already; --resume goes on, --out names another folder")
         store.tell(study=source.read_text(encoding="utf-8"), command=f"repair study {source.name}")
         try:

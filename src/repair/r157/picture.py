@@ -11,7 +11,7 @@ from repair.arrays import Array
 from repair.io.plotting import import_matplotlib
 from repair.r157.cases import CASES
 from repair.r157.results import Fate, Results
-from repair.report.style import STYLE, WIDTH
+from repair.report.style import FigureStyle
 
 __all__ = ["SHOWN", "picture"]
 
@@ -51,8 +51,9 @@ def picture(results: Results, pair: tuple[int, int] | None) -> Any:
     names = [name for name in results.fates if name != "never"]
     wide = min(len(names), _ACROSS)
     deep = -(-len(names) // wide)
-    with rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(figsize=(1.25 * WIDTH, 2.3 * deep + 1.0), layout="constrained")
+    style = FigureStyle()
+    with rc_context({**style.rc, "axes.grid": False}):
+        figure = Figure(figsize=(1.25 * style.width, 2.3 * deep + 1.0), layout="constrained")
         panels = figure.subplots(deep, wide, sharex=True, sharey=True, squeeze=False)
         for axes, name in zip(panels.flat, names, strict=False):
             colours = np.zeros((len(y), len(x)))

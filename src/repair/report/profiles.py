@@ -10,12 +10,14 @@ import numpy as np
 from repair.arrays import Array
 from repair.io.plotting import import_matplotlib
 from repair.outcome.data import Outcome
-from repair.report.along import Along, driven_line, overlapped
 from repair.report.lines import (
+    Along,
     Styled,
     continuation_lines,
     drawing_in,
+    driven_line,
     lateral_acceleration,
+    overlapped,
     reference_line,
     repair_lines,
     title_of,

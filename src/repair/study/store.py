@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from repair.errors import OutputError, RepairError, in_words
+from repair.io.alone import Alone
 from repair.study.plan import Task, package_version
 from repair.study.rows import STUDY_COLUMNS, type_of
 
@@ -59,14 +60,16 @@ class Store:
     Raises
     ------
     RepairError
-        If it cannot be made or read, or was made by a version with other columns.
+        If it cannot be made or read, was made by a version with other columns, or another study writes there.
     """
 
     def __init__(self, folder: Path, *, fresh: bool = False, readonly: bool = False) -> None:
         self.path = folder / STORE_FILE
+        self.alone: Alone | None = None
         try:
             if not readonly:
                 folder.mkdir(parents=True, exist_ok=True)
+                self.alone = Alone(folder, "a study")
                 if fresh:
                     for end in ("", "-wal", "-shm"):
                         self.path.with_name(self.path.name + end).unlink(missing_ok=True)
@@ -74,9 +77,17 @@ class Store:
                 raise RepairError(
                     f"{folder} holds no {STORE_FILE}; `repair study` and `repair sweep` write one"
                 )
-        except OSError as error:
-            raise OutputError(f"the store {self.path} cannot be made: {error.strerror or error}") from error
-        self._open(readonly)
+            self._open(readonly)
+        except BaseException as error:
+            self._let_in()
+            if isinstance(error, OSError):
+                why = error.strerror or error
+                raise OutputError(f"the store {self.path} cannot be made: {why}") from error
+            raise
+
+    def _let_in(self) -> None:
+        if self.alone is not None:
+            self.alone.close()
 
     def _open(self, readonly: bool) -> None:
         try:
@@ -111,6 +122,7 @@ class Store:
         with suppress(sqlite3.Error):
             self.base.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self.base.close()
+        self._let_in()
 
     def about(self) -> dict[str, str]:
         """What is told about the study: its text, the command, versions."""
