@@ -1,4 +1,4 @@
-"""A planner's cycles on the crossing of Scenario 1: a new plan and new predictions each time, from a seed."""
+"""A planner's cycles on a scenario's road: a new plan and new predictions each time, from a seed."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def cycles(scene: Scene, seed: int = 0, episode: int = EPISODE) -> Iterator[Cycl
     while True:
         s, v = float(scene.start[0, 0]), float(scene.start[1, 0])
         for k in range(episode):
-            faster, most = random.uniform(0.4, 0.6), random.uniform(12.0, 14.0)
+            faster, most = random.uniform(0.4, 0.6), max(random.uniform(12.0, 14.0), v)
             u = np.minimum(v + faster * t, most)
             way = s + np.concatenate([[0.0], np.cumsum(0.5 * dt * (u[1:] + u[:-1]))])
             place = frame.to_cartesian(way, np.zeros(len(way)))

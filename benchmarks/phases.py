@@ -204,7 +204,7 @@ def preparation(context: Context, number: int) -> Report:
         "occupancy": lambda: build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets),
         "checker (collision world, road)": lambda: Checker(scene, p.limits, config.checker),
         "reference": lambda: make_reference(scene, config.reference, p.occupancy),
-        "conflict (TTC)": lambda: detect_conflict(p.reference, p.occupancy, p.checker, p.t_reference),
+        "conflict (TTC)": lambda: detect_conflict(p.reference, p.boxes, p.checker, p.t_reference),
     }
     group = f"once for a scene: {context.title(number)}"
     rounds = context.rounds(9, 3)

@@ -23,7 +23,7 @@ from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.problem.factory import part_in_reach
-from repair.problem.limits import reference_limits, resolve_limits
+from repair.problem.limits import Limits, reference_limits, resolve_limits
 from repair.reference.consistency import Recording
 from repair.reference.given import GivenReference, given_reference
 from repair.reference.registry import (
@@ -41,7 +41,9 @@ from repair.situation import Situation
 from repair.solvers.registry import sections
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.vehicle.parameters import Vehicle
-from repair.world.occupancy import build_occupancy, shrink_to_start
+from repair.world.boxes import Occupancy
+from repair.world.laid import Boxes
+from repair.world.occupancy import Within, build_occupancy, shrink_to_start
 
 __all__ = ["Phases", "Prepared", "again_for", "among", "laid_out", "prepare", "what_matters"]
 
@@ -88,6 +90,11 @@ class Prepared(Situation):
     config: Config
     phases: dict[str, float]
     given: GivenReference | None = None
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be assumed, and which settings have no effect."""
+        return (*self.said(), *_no_effect(self.config))
 
     @property
     def too_late(self) -> Callable[[], float] | None:
@@ -161,8 +168,7 @@ def again_for(prepared: Prepared, config: Config) -> Prepared:
     before, config = prepared.config, agreed_with(config, prepared.scene)
     if what_matters(before) != what_matters(config):
         raise ConfigError("what is prepared was prepared with other settings; prepare it again")
-    said = prepared.notes[: len(prepared.notes) - len(_no_effect(before))]
-    return replace(prepared, config=config, notes=(*said, *_no_effect(config)))
+    return replace(prepared, config=config)
 
 
 def among(prepared: Prepared, obstacles: tuple[Obstacle, ...]) -> Prepared:
@@ -202,37 +208,38 @@ def laid_out(
     s_offset = vehicle.half_length + room if s_offset is None else s_offset
     l_offset = vehicle.half_width + room if l_offset is None else l_offset
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
-    with phases("occupancy"):
-        places = given.positions if given is not None and within_reach else None
-        part = None if places is None else part_in_reach(scene, config.repair, limits, places)
-        occupancy, notes = build_occupancy(scene.obstacles, scene.frame, scene.dt, s_offset, l_offset, part)
     with phases("checker"):
         allowed = [reference_limits(limits, config.limits, vehicle, accepted=told) for told in (False, True)]
         checker = Checker(scene, limits, sampled(config.checker, scene.dt), allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
+    within = partial(_part_in_reach, scene, config, limits, given) if within_reach else None
+    whole = Boxes(partial(_boxes, scene, offsets, within))
+    if not within_reach:
+        with phases("occupancy"):
+            whole.occupancy  # noqa: B018 - to be known by that name in the times
     with phases("reference"):
-        known, _ = shrink_to_start(occupancy, scene.start[0], touching, offsets)
         if reference is not None:
             followed = reference
         elif given is not None:
             followed = given.curve(scene)
         else:
+            known, _ = shrink_to_start(whole.occupancy, scene.start[0], touching, offsets)
             followed = make_reference(scene, config.reference, known)
     t_reference = min(scene.horizon, followed.t_end)
     places = followed.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
-    occupancy, more = shrink_to_start(occupancy, places, touching, offsets)
+    boxes = Boxes(partial(_left_of, whole, places, touching, offsets))
+    more: tuple[str, ...] = ()
     with phases("conflict"):
-        conflict, verdict = detect_conflict(followed, occupancy, checker, t_reference)
+        conflict, verdict = detect_conflict(followed, boxes, checker, t_reference)
         recording = None
         if reference is None or _JUDGED & set(verdict.reasons):
             recording = recording_of(scene, config.reference) if given is None else given.recording
         if recording is not None and recording.refused is not None and _JUDGED & set(verdict.reasons):
             checker.take_word(recording.refused(), allowed[1])
-            conflict, again = detect_conflict(followed, occupancy, checker, t_reference)
+            conflict, again = detect_conflict(followed, boxes, checker, t_reference)
             if Reason.KINEMATICS.value in set(verdict.reasons) - set(again.reasons):
-                more = (*more, _accepted(recording, vehicle))
-    said = reference_notes(scene, followed, recording)
+                more = (_accepted(recording, vehicle),)
     wanted = config.repair.horizon
     if wanted is None:
         wanted = conflict.time + config.repair.after_conflict
@@ -247,24 +254,56 @@ def laid_out(
         scene=scene,
         settings=config.repair,
         limits=limits,
-        occupancy=occupancy,
+        boxes=boxes,
         reference=followed,
         checker=checker,
         conflict=conflict,
         t_reference=t_reference,
         t_end=float(t_end),
-        notes=(
-            *scene.notes,
-            *_bridged(checker, places),
-            *said,
-            *notes,
-            *more,
-            *_remarks(config, wanted, t_reference),
-        ),
+        said=partial(_said, scene, config, checker, places, recording, followed, boxes, more, wanted),
         config=config,
         phases=phases.seconds,
         given=given,
     )
+
+
+def _part_in_reach(
+    scene: Scene, config: Config, limits: Limits, given: GivenReference | None
+) -> Within | None:
+    """The part of the road where the ego may be; None where nobody knows."""
+    places = None if given is None else given.positions
+    return None if places is None else part_in_reach(scene, config.repair, limits, places)
+
+
+def _boxes(
+    scene: Scene, offsets: tuple[float, float], within: Callable[[], Within | None] | None
+) -> tuple[Occupancy, tuple[str, ...]]:
+    """The traffic as boxes, and who is not seen by them."""
+    part = None if within is None else within()
+    return build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets, part)
+
+
+def _left_of(
+    whole: Boxes, places: Array, touching: set[int], offsets: tuple[float, float]
+) -> tuple[Occupancy, tuple[str, ...]]:
+    """The boxes without the margins that the reference never had."""
+    occupancy, notes = shrink_to_start(whole.occupancy, places, touching, offsets)
+    return occupancy, (*whole.notes, *notes)
+
+
+def _said(
+    scene: Scene, config: Config, checker: Checker, places: Array, recording: Recording | None,
+    followed: Curve, boxes: Boxes, more: tuple[str, ...], wanted: float,
+) -> tuple[str, ...]:  # fmt: skip
+    """What had to be assumed, for whoever asks."""
+    t_reference = min(scene.horizon, followed.t_end)
+    said = [*_bridged(checker, places), *reference_notes(scene, followed, recording), *boxes.notes, *more]
+    if config.repair.horizon is not None and wanted > t_reference + INSTANT:
+        said.append(
+            f"repair.horizon is {wanted:g} s, but what is known ends at {t_reference:g} s, "
+            "and so do the repairs"
+        )
+    return (*scene.notes, *said)
 
 
 def _accepted(recording: Recording, vehicle: Vehicle) -> str:
@@ -298,17 +337,6 @@ def _bridged(checker: Checker, places: Array) -> list[str]:
     return found
 
 
-def _remarks(config: Config, wanted: float, t_reference: float) -> list[str]:
-    """Settings that were made on purpose and change nothing here."""
-    remarks = []
-    if config.repair.horizon is not None and wanted > t_reference + INSTANT:
-        remarks.append(
-            f"repair.horizon is {wanted:g} s, but what is known ends at {t_reference:g} s, "
-            "and so do the repairs"
-        )
-    return [*remarks, *_no_effect(config)]
-
-
 def _no_effect(config: Config) -> list[str]:
-    """Those that the configuration alone tells."""
+    """Settings that were made on purpose and change nothing here."""
     return [f"{key} has no effect with {other}={value}" for key, other, value in config.without_effect()]

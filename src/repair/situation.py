@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -13,14 +14,16 @@ from repair.curves.base import Curve, SplicedCurve
 from repair.onward.plan import Onward, back_to_reference, to_the_goal
 from repair.problem.factory import ProblemFactory, Unguided
 from repair.problem.limits import Limits
+from repair.problem.problem import RepairProblem
 from repair.problem.settings import RepairConfig
 from repair.terminal.judge import EndJudge
 from repair.terminal.required import SafeEnds
 from repair.terminal.room import RoomToStop, room_to_stop
 from repair.terminal.verdict import Terminal
 from repair.timegrid import on_grid
-from repair.world.boxes import Occupancy
+from repair.world.boxes import Occupancy, nothing
 from repair.world.dead_ends import dead_ends, with_boxes
+from repair.world.laid import Boxes
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
@@ -39,8 +42,8 @@ class Situation:
     settings : RepairConfig
         What a repair problem is.
     limits : Limits
-    occupancy : Occupancy
-        The traffic as inflated boxes along the scene's frame.
+    boxes : Boxes
+        Makes ``occupancy``.
     reference : Curve
     checker : Checker
     conflict : Conflict
@@ -49,24 +52,34 @@ class Situation:
         Until when the reference is followed and judged [s].
     t_end : float
         End of the repairs [s].
-    notes : tuple of str
-        What had to be assumed.
+    said : callable
+        Makes ``notes``.
     """
 
     scene: Scene
     settings: RepairConfig
     limits: Limits
-    occupancy: Occupancy
+    boxes: Boxes
     reference: Curve
     checker: Checker
     conflict: Conflict
     t_reference: float
     t_end: float
-    notes: tuple[str, ...]
+    said: Callable[[], tuple[str, ...]]
 
     def __repr__(self) -> str:
         ttc, name = in_seconds(self.conflict.time), type(self).__name__
         return f"<{name} of {self.scene!r}: TTC {ttc} ({self.conflict.kind}), repairs until {self.t_end:g} s>"
+
+    @property
+    def occupancy(self) -> Occupancy:
+        """The traffic as inflated boxes along the scene's frame."""
+        return self.boxes.occupancy
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be assumed."""
+        return self.said()
 
     @cached_property
     def source(self) -> ProblemFactory:
@@ -78,12 +91,22 @@ class Situation:
         """Those for backends that find their own way: no guide, and the limits to the full."""
         return Unguided(self._factory(self.limits))
 
-    def _factory(self, limits: Limits) -> ProblemFactory:
-        checker, occupancy = self.checker, with_boxes(self.occupancy, self.dead_ends)
+    def _factory(self, limits: Limits, occupancy: Occupancy | None = None) -> ProblemFactory:
+        checker = self.checker
+        if occupancy is None:
+            occupancy = with_boxes(self.occupancy, self.dead_ends)
         return ProblemFactory(
             self.scene, self.settings, limits, occupancy, self.reference, self.t_end,
             checker.config.clearance, checker.road, self._afterwards(limits),
         )  # fmt: skip
+
+    def judged_at(self, t_rep: float) -> RepairProblem:
+        """The problem at a t_rep that a curve is judged by, without the boxes that nobody would look at."""
+        config = self.checker.config
+        if config.margin or config.extra or config.terminal == "require":
+            return self.source.plain(t_rep)
+        limits = self.limits.reserving(self.settings.reserve)
+        return self._factory(limits, nothing(self.scene.times)).plain(t_rep)
 
     def _afterwards(self, limits: Limits) -> RoomToStop | None:
         config = self.checker.config

@@ -143,16 +143,68 @@ def test_without_speeds_the_plan_says_them_by_its_places(scene):
 
 
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
-def test_a_deadline_holds_and_what_was_kept_counts(scene, backend):
+def test_a_deadline_holds_and_what_was_kept_counts(scene, backend, monkeypatch):
+    """By the processor's time: what else the machine does is not the library's."""
+    monkeypatch.setattr(time, "perf_counter", time.process_time)
     watch = repair.Repairer(scene, backend=backend)
     assert watch.update(plan(scene)).complete
     late = []
     for k in range(1, 8):
         now, begin = k * scene.dt, time.process_time()
-        cycle = watch.update(plan(scene, now), now=now, deadline=0.01)
-        late.append(time.process_time() - begin - 0.01)
+        cycle = watch.update(plan(scene, now), now=now, deadline=0.04)
+        late.append(time.process_time() - begin - 0.04)
         assert cycle.status == "found"
-    assert np.median(late) < 0.02
+    assert np.median(late) < 0.004
+
+
+def test_a_deadline_that_is_over_at_once_answers_nothing_and_forgets_nothing(scene):
+    watch = repair.Repairer(scene, backend="ego")
+    first = watch.update(plan(scene))
+    for k in (1, 2, 3):
+        cycle = watch.update(plan(scene, k * scene.dt), now=k * scene.dt, deadline=1e-6)
+        assert cycle.status == "budget_exhausted"
+        assert not cycle.complete
+        assert cycle.f_ttr is None
+        assert np.isnan(cycle.ttc)
+        assert cycle.states is None
+        assert cycle.trajectory is None
+        assert "budget_exhausted" in repr(cycle)
+    again = watch.update(plan(scene, 4 * scene.dt), now=4 * scene.dt)
+    assert 4 * scene.dt + again.f_ttr >= first.f_ttr - 1e-9
+    with pytest.raises(ReferenceTrajectoryError, match="a plan is needed"):
+        watch.update(cycle)
+
+
+@pytest.mark.parametrize("deadline", [0.001, 0.002, 0.004, 0.008, 0.016])
+def test_whatever_a_deadline_cuts_what_is_answered_was_checked(scene, deadline, monkeypatch):
+    """A repair that is answered passes the checker of its own cycle once more."""
+    monkeypatch.setattr(time, "perf_counter", time.process_time)
+    watch = repair.Repairer(scene, backend="ego")
+    for k in range(10):
+        now = 0.1 * k
+        limit = None if k in (0, 5) else deadline
+        cycle = watch.update(plan(scene, now), now=now, deadline=limit)
+        assert cycle.status in ("found", "budget_exhausted")
+        assert (cycle.f_ttr is None) == (cycle.status == "budget_exhausted")
+        if cycle.f_ttr is not None:
+            problem = cycle.prepared.source.plain(cycle.f_ttr)
+            assert cycle.prepared.checker.check(problem, cycle.curve.repaired).ok
+
+
+def test_where_the_last_search_ended_the_next_one_begins(scene):
+    """A kept repair that does not hold any more still says where to look."""
+    watch = repair.Repairer(scene, backend="ego")
+    first = watch.update(plan(scene))
+    assert len(first.search.probes) > 2
+    nearer = [
+        repair.Prediction(o.id, o.states[1:, :3] - [1.5, 0.0, 0.0], *(2.0 * o.rectangles[0, 3:]))
+        for o in scene.obstacles
+    ]
+    cycle = watch.update(plan(scene, 0.1), traffic=nearer, now=0.1)
+    assert not cycle.kept
+    assert cycle.search.probes[0].t_rep > 0.0
+    fresh = repair.Repairer(scene, backend="ego").update(plan(scene, 0.1), traffic=nearer, now=0.1)
+    assert cycle.f_ttr == fresh.f_ttr
 
 
 def test_threads_do_not_meet(scene):

@@ -20,7 +20,7 @@ SOURCES = ("constant", "accelerate", "planner")
 def verdict_of(scenario, source: str) -> set[str]:
     config = load_config(overrides=[f"reference.source={source}"])
     made = prepare(load_scene(scenario, config), config)
-    _, verdict = detect_conflict(made.reference, made.occupancy, made.checker, made.t_reference)
+    _, verdict = detect_conflict(made.reference, made.boxes, made.checker, made.t_reference)
     return set(verdict.reasons)
 
 

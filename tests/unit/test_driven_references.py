@@ -37,7 +37,7 @@ def given(case: Case, scenario, solution, *overrides: str) -> Prepared:
 
 
 def verdict_of(made: Prepared) -> set[str]:
-    _, verdict = detect_conflict(made.reference, made.occupancy, made.checker, made.t_reference)
+    _, verdict = detect_conflict(made.reference, made.boxes, made.checker, made.t_reference)
     return set(verdict.reasons)
 
 

@@ -78,6 +78,8 @@ class Checker:
         samples = np.arange(scene.n_steps * config.substeps + 1)
         self._times = frozen(samples * (scene.dt / config.substeps))
         self._followed: Followed | None = None
+        self._crossing: tuple[Followed, bool] | None = None
+        self._touched: tuple[Curve, float, Contact | None] | None = None  # what the last reference touches
         self._checks = {name: CHECKS[name] for name in config.extra}
         self._beside = self._met_at_start(config.clearance) if config.clearance else frozenset()
 
@@ -102,6 +104,9 @@ class Checker:
 
     def contact(self, curve: Curve, t_end: float) -> Contact | None:
         """First contact of the true rectangles along the curve."""
+        known = self._touched
+        if known is not None and known[0] is curve and known[1] == t_end:
+            return known[2]
         states = self.drive(curve, t_end)
         return self.world.contact(states.x, states.y, states.orientation)
 
@@ -131,7 +136,7 @@ class Checker:
         found = self._limits(curve, after, problem, path)
         if self.config.margin:
             found += boxes_entered(problem, curve, after, self.times(problem.t_end), self.config.substeps)
-        found += self._clear(path, s, orientation, first, problem.t_rep)
+        found += self._clear(path, s, orientation, first, problem.t_rep)[0]
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         if self.config.limits and not found:
             at = slice(None, None, self.config.substeps)
@@ -146,10 +151,18 @@ class Checker:
     def _over_a_gap(self, problem: RepairProblem, path: CartesianPath, orientation: Array) -> list[Violation]:
         """A gap of the map that is no road for CommonRoad's own check, where the reference crosses none."""
         crossed = self._gap_under(path, orientation)
-        if crossed is None or self._kept(problem.reference, problem.t_end).crosses:
+        if crossed is None or self._crosses(self._kept(problem.reference, problem.t_end)):
             return []
         index, words, place = crossed
         return [Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place)]
+
+    def _crosses(self, followed: Followed) -> bool:
+        """Whether the reference crosses a gap; asked only where a repair does."""
+        if self._crossing is None or self._crossing[0] is not followed:
+            path = self.scene.frame.carry(self.times(followed.t_end), followed.motion)
+            _, orientation = self.scene.model.angles(path, float(followed.slip[0]))
+            self._crossing = followed, self._gap_under(path, orientation) is not None
+        return self._crossing[1]
 
     def _gap_under(
         self, path: CartesianPath, orientation: Array
@@ -182,7 +195,8 @@ class Checker:
         path, s, slip, orientation = self._follow(reference, t_end)
         if not is_finite(path):
             return _NOT_FINITE
-        found = self._clear(path, s, orientation, 0, 0.0)
+        found, contact = self._clear(path, s, orientation, 0, 0.0)
+        self._touched = reference, t_end, contact
         if self.config.limits:
             found += self._reference_limits(reference, t_end)
         until = min((violation.time for violation in found), default=float("inf"))
@@ -198,8 +212,7 @@ class Checker:
         motion = motion_of(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
         slip, orientation = self.scene.model.angles(path, self._standing(path))
-        crosses = self._gap_under(path, orientation) is not None
-        self._followed = Followed(reference, t_end, motion, slip, float(path.heading[0]), crosses)
+        self._followed = Followed(reference, t_end, motion, slip, float(path.heading[0]))
         return path, motion[0], slip, orientation
 
     def _kept(self, reference: Curve, t_end: float) -> Followed:
@@ -247,11 +260,14 @@ class Checker:
 
     def _clear(
         self, path: CartesianPath, s: Array, orientation: Array, first_sample: int, t_from: float
-    ) -> list[Violation]:
-        """First contact with an obstacle, or its margin entered, and first departure from the road."""
+    ) -> tuple[list[Violation], Contact | None]:
+        """First contact with an obstacle, or its margin entered, and first departure from the road.
+
+        Also the first contact of the true shapes, which a margin that is entered earlier would hide.
+        """
         found = []
         centre = path.xy.view(np.complex128)[:, 0]
-        obstacle = self._met(centre, orientation, first_sample, path.longest, t_from)
+        obstacle, contact = self._met(centre, orientation, first_sample, path.longest, t_from)
         if obstacle is not None:
             found.append(obstacle)
         index = self._off_road(s, centre, orientation)
@@ -261,12 +277,12 @@ class Checker:
             words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
             words += self.scene.ending_at(place)
             found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place))
-        return found
+        return found, contact
 
     def _met(
         self, centre: Points, orientation: Array, first: int, step: float, t_from: float
-    ) -> Violation | None:
-        """The first obstacle that is touched, or whose margin is entered from ``t_from`` on.
+    ) -> tuple[Violation | None, Contact | None]:
+        """The first obstacle that is touched, or whose margin is entered from ``t_from`` on; and the contact.
 
         A margin that the ego starts in counts once it has been left.
         """
@@ -281,13 +297,13 @@ class Checker:
         if contact is not None and (near is None or contact.time <= near.time):
             behind = " from behind" if contact.from_behind else ""
             detail = f"obstacle {contact.obstacle_id}{behind}"
-            return Violation(Reason.COLLISION, contact.time, detail, contact.obstacle_id)
+            return Violation(Reason.COLLISION, contact.time, detail, contact.obstacle_id), contact
         if near is None:
-            return None
+            return None, contact
         detail = f"obstacle {near.obstacle_id} within {margin:g} m"
         if contact is not None:
             detail += f", contact with obstacle {contact.obstacle_id} at {contact.time:.2f} s"
-        return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id)
+        return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id), contact
 
     def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
         """Index of the first pose that is not on the road; asked about are those the corridor leaves."""

@@ -11,14 +11,14 @@ from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.curves.base import Curve
 from repair.timegrid import on_grid, steps_until
 from repair.world.advance import FINEST
-from repair.world.boxes import Occupancy
+from repair.world.laid import Boxes
 from repair.world.occupancy import first_entry
 
 __all__ = ["detect_conflict"]
 
 
 def detect_conflict(
-    reference: Curve, occupancy: Occupancy, checker: Checker, t_end: float
+    reference: Curve, boxes: Boxes, checker: Checker, t_end: float
 ) -> tuple[Conflict, Verdict]:
     """TTC: the first violation of any kind on the reference, at the scenario's steps.
 
@@ -35,17 +35,17 @@ def detect_conflict(
     verdict = checker.check_reference(reference, t_end)
     contact = checker.contact(reference, t_end)
     candidates: list[tuple[float, int, Violation]] = []
-    boxes = checker.config.conflict == "boxes"
-    if boxes:
+    by_boxes = checker.config.conflict == "boxes"
+    if by_boxes:
         steps = min(steps_until(t_end, dt), checker.scene.n_steps)
         sampled = reference.sample(np.arange(steps + 1) * dt)
-        entry = first_entry(occupancy, sampled)
+        entry = first_entry(boxes.occupancy, sampled)
         if entry is not None:
             at = float(sampled.t[entry[0]])
-            candidates.append((at, 0, Violation(Reason.MARGIN, at, "", int(occupancy.ids[entry[1]]))))
+            candidates.append((at, 0, Violation(Reason.MARGIN, at, "", int(boxes.occupancy.ids[entry[1]]))))
     for violation in verdict.violations:
         at = on_grid(violation.time + FINEST, dt)  # a time of contact is early by no more than that
-        if boxes and violation.reason is Reason.COLLISION and at < violation.time:
+        if by_boxes and violation.reason is Reason.COLLISION and at < violation.time:
             at += dt  # the paper looks at steps
         candidates.append((at, 1, violation))
     if not candidates:

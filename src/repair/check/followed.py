@@ -33,8 +33,6 @@ class Followed:
         Slip angle at the centre [rad].
     heading : float
         Of the path at the start [rad].
-    crosses : bool
-        Whether it crosses a gap of the map that is road here and none for CommonRoad's own boundary check.
     """
 
     reference: Curve
@@ -42,7 +40,6 @@ class Followed:
     motion: Array
     slip: Array
     heading: float
-    crosses: bool = False
 
     def moving(self, step: int, substeps: int) -> int:
         """The dense sample of the last step until ``step`` at which the vehicle moves, or the first one.

@@ -26,15 +26,16 @@ class Cycle:
     ----------
     now : float
         When the cycle begins [s].
-    prepared : Prepared
-        Scene, reference, conflict and limits of the cycle.
+    prepared : Prepared or None
+        Scene, reference, conflict and limits of the cycle; None where the deadline came before.
     search : SearchResult
         What was searched in this cycle: where an earlier repair holds, only later ones.
     f_ttr : float or None
         Until when the plan can be followed [s]: the later one of what was found and of what was kept; inf
         without a conflict, None where nothing is verified.
-    curve : Curve
-        What is driven, in the frame of ``prepared.scene``: the plan, repaired from ``f_ttr`` on.
+    curve : Curve or None
+        What is driven, in the frame of ``prepared.scene``: the plan, repaired from ``f_ttr`` on. None without
+        ``prepared``.
     kept : bool
         The repair is that of an earlier cycle, shifted and checked again.
     complete : bool
@@ -46,10 +47,10 @@ class Cycle:
     """
 
     now: float
-    prepared: Prepared
+    prepared: Prepared | None
     search: SearchResult
     f_ttr: float | None
-    curve: Curve
+    curve: Curve | None
     kept: bool
     complete: bool
     rebuilt: tuple[str, ...]
@@ -57,10 +58,10 @@ class Cycle:
 
     def __repr__(self) -> str:
         how = ", kept" if self.kept else "" if self.complete else ", cut short"
-        return (
-            f"<Cycle at {self.now:g} s: {self.status.value}{how}, TTC {in_seconds(self.ttc)}, "
-            f"F-TTR {in_seconds(self.f_ttr)}>"
-        )
+        begin = f"<Cycle at {self.now:g} s: {self.status.value}{how}"
+        if self.prepared is None:
+            return f"{begin}, nobody had the time to look at the plan>"
+        return f"{begin}, TTC {in_seconds(self.ttc)}, F-TTR {in_seconds(self.f_ttr)}>"
 
     @property
     def status(self) -> SearchStatus:
@@ -74,12 +75,14 @@ class Cycle:
 
     @property
     def ttc(self) -> float:
-        """Time-To-Collision [s], inf without a conflict."""
+        """Time-To-Collision [s], inf without a conflict; NaN where the deadline came before it was known."""
         return self.search.conflict.time
 
     @property
-    def states(self) -> DrivenStates:
-        """What is driven, at the scenario's steps."""
+    def states(self) -> DrivenStates | None:
+        """What is driven, at the scenario's steps; None where nobody had the time to look at the plan."""
+        if self.prepared is None or self.curve is None:
+            return None
         repaired = self.f_ttr is not None and np.isfinite(self.f_ttr)
         t_end = self.prepared.t_end if repaired else self.prepared.t_reference
         driven = self.prepared.checker.drive(self.curve, t_end)
@@ -87,5 +90,8 @@ class Cycle:
 
     @property
     def trajectory(self) -> Any:
-        """What is driven, as a ``commonroad.scenario.trajectory.Trajectory`` of KS states."""
-        return to_trajectory(self.prepared.scene, self.states)
+        """The same as a ``commonroad.scenario.trajectory.Trajectory`` of KS states."""
+        states = self.states
+        if self.prepared is None or states is None:
+            return None
+        return to_trajectory(self.prepared.scene, states)

@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from repair.check.verdict import Verdict
 from repair.curves.base import Curve, FrenetTrajectory
+from repair.curves.bernstein import BernsteinCurve
+from repair.curves.bspline import UniformBSpline
 from repair.preparation import Prepared
 from repair.scene.frame import FrenetFrame
 from repair.timegrid import INSTANT, on_grid
@@ -71,6 +73,17 @@ class KeptRepair:
     now: float
     frame: FrenetFrame
 
+    def seen_from(self, now: float) -> Curve:
+        """The curve with its times counted from a later cycle."""
+        by, curve = now - self.now, self.curve
+        if isinstance(curve, BernsteinCurve | UniformBSpline):  # which keep what is known of their hulls
+            return replace(curve, t_start=curve.t_start - by)
+        return Later(curve, by)
+
+    def due(self, now: float) -> float:
+        """What is left of its time-to-repair [s]; negative once it is past."""
+        return self.f_ttr - (now - self.now)
+
 
 def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[float, Curve] | None:
     """The kept repair among the traffic as it is now: until when it can be waited, and what is driven then.
@@ -91,8 +104,8 @@ def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[fl
     """
     if kept.frame is not prepared.scene.frame:
         return None
-    curve = Later(kept.curve, now - kept.now)
-    t_rep = on_grid(max(kept.f_ttr - (now - kept.now), 0.0), prepared.scene.dt)
+    curve = kept.seen_from(now)
+    t_rep = on_grid(max(kept.due(now), 0.0), prepared.scene.dt)
     if t_rep >= min(prepared.conflict.time, curve.t_end) - INSTANT:
         return None
     here, there = (c.sample([t_rep]) for c in (prepared.reference, curve))
@@ -101,5 +114,5 @@ def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[fl
         return None
     if t_rep > prepared.t_end - prepared.scene.dt + INSTANT:
         return None  # nothing would be left of it
-    verdict: Verdict = prepared.judge.check(prepared.source.plain(t_rep), curve)
+    verdict: Verdict = prepared.judge.check(prepared.judged_at(t_rep), curve)
     return (t_rep, curve) if verdict.ok else None

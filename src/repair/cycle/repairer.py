@@ -9,25 +9,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from repair.api import RepairResult, find, make
+from repair.api import RepairResult
 from repair.arrays import Array, frozen
-from repair.backend.base import RepairBackend
 from repair.check.checker import Checker
+from repair.check.verdict import Conflict
 from repair.config.load import load_config
 from repair.config.schema import Config
 from repair.curves.base import Curve, SplicedCurve
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
 from repair.cycle.kept import KeptRepair, verified_again
+from repair.cycle.paced import LEAST, Pace, Paced
+from repair.cycle.ready import made_ready
+from repair.cycle.searching import searched
+from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError, in_words, kind_of
 from repair.outcome.data import Outcome
-from repair.preparation import Phases, Prepared, laid_out
+from repair.preparation import Prepared, laid_out
 from repair.reference.given import GivenReference, given_reference
 from repair.scene.commonroad import load_scene, moved_on
 from repair.scene.reframe import lanes_at, reframe
@@ -35,10 +39,9 @@ from repair.scene.road.lanes import Lane
 from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.given_rows import given_obstacles
 from repair.scene.traffic.obstacle import Obstacle, later
-from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT, steps_until
-from repair.vehicle.commonroad_ks import load_official
 
 __all__ = ["Cycle", "Repairer"]
 
@@ -86,12 +89,12 @@ class Repairer:
         self.scene = _scene_of(road, planning_problem, config)
         self._first = self.scene
         self._start()
-        self._made()
 
     def _start(self) -> None:
         """What is made on the way."""
         self._lanes: Mapping[int, Lane] | None = None
-        self._backend: RepairBackend | None = None
+        self._backend = made_ready(self.config)
+        self._paces: dict[str, Pace] = {}
         self._framed: Scene | None = None
         self._room = 0.0
         self._checker: Checker | None = None
@@ -107,6 +110,29 @@ class Repairer:
     def reset(self) -> None:
         """Forget what was found: the next cycle is a first one."""
         self._kept = None
+
+    def warm(self, reference: Any, *, traffic: Iterable[Any] | None = None, ego: Any = None) -> None:
+        """Ask what the first cycles will ask, without a deadline, and forget the answers.
+
+        From then on what is imported late, the frame and the solver's structures for such plans are there,
+        and how long the parts of a cycle take is known. Without it the first cycles with a deadline may be
+        late by what that takes.
+
+        Parameters
+        ----------
+        reference, traffic, ego
+            As in :meth:`update`.
+
+        Raises
+        ------
+        RepairError
+            If something cannot be used.
+        """
+        traffic = None if traffic is None else list(traffic)
+        for _ in range(LEAST):
+            self.reset()
+            self.update(reference, traffic=traffic, ego=ego)
+        self.reset()
 
     def update(
         self,
@@ -146,38 +172,84 @@ class Repairer:
             If something cannot be used; what was kept stays as it was.
         """
         begin = time.perf_counter()
-        if deadline is not None:
-            if not (isinstance(deadline, int | float) and deadline > 0.0):
-                raise ConfigError(f"the deadline is {in_words(deadline)}; it has to be positive [s]")
-            load_official()
+        if deadline is not None and not (isinstance(deadline, int | float) and deadline > 0.0):
+            raise ConfigError(f"the deadline is {in_words(deadline)}; it has to be positive [s]")
         if isinstance(reference, RepairResult | Cycle):
             reference = reference.states
         elif isinstance(reference, Outcome):
             reference = reference.driven()
+        if reference is None:
+            raise ReferenceTrajectoryError(
+                "a plan is needed, and None is none; a cycle that had no time has none either"
+            )
         if isinstance(reference, Curve):
             raise ReferenceTrajectoryError("a Repairer takes places on the plane, and not a curve in a frame")
-        step = self._step(now)
-        state = ego_of(ego, reference, self.scene)
-        rebuilt: list[str] = []
-        scene = self._now(step, state, traffic)
-        given = given_reference(reference, scene)
-        scene, checker = self._frame(scene, given, rebuilt)
-        prepared = laid_out(scene, self.config, given, Phases(), like=checker, within_reach=True)
-        self._checker = prepared.checker
-        kept = None if self._kept is None else verified_again(self._kept, prepared, now)
-        settings = self.config.search
-        if deadline is not None:
-            left = max(deadline - (time.perf_counter() - begin) - _spare(deadline), 1e-6)
-            settings = replace(settings, time_limit=min(left, settings.time_limit or left))
-        found = _searched(prepared, self._made(), settings, None if kept is None else kept[0])
-        return self._answer(now, prepared, found, kept, tuple(rebuilt), begin)
+        at = None if deadline is None else begin + deadline - _spare(deadline)
+        asked = _Asked(now, self._step(now), begin, at, Paced(paces=self._paces))
+        try:
+            prepared = self._prepared(reference, traffic, ego, asked)
+        except OutOfTime:
+            conflict = Conflict(np.nan, contact_time=np.nan, exact_time=np.nan)
+            nothing = SearchResult(SearchStatus.BUDGET_EXHAUSTED, conflict, None, None, complete=False)
+            return Cycle(now, None, nothing, None, None, False, False, asked.told, _since(begin))
+        return self._answered(prepared, asked)
 
     # -- parts of a cycle --------------------------------------------------------------------------------
 
-    def _made(self) -> RepairBackend:
-        if self._backend is None:
-            self._backend = make(self.config)
-        return self._backend
+    def _prepared(self, reference: Any, traffic: Iterable[Any] | None, ego: Any, asked: _Asked) -> Prepared:
+        """The plan among the traffic, and until when it can be followed."""
+        phases = asked.phases
+        with until(asked.at):
+            with phases("plan"):
+                state = ego_of(ego, reference, self.scene)
+            with phases("traffic"):
+                scene = self._now(asked.step, state, traffic)
+            with phases("given"):
+                given = given_reference(reference, scene)
+        before = self._framed
+        scene, checker = self._frame(scene, given, asked.rebuilt)
+        # A frame is laid out once for many cycles, whatever the deadline, and so is the road's edge along it.
+        with until(asked.at if self._framed is before else None):
+            prepared = laid_out(scene, self.config, given, phases, like=checker, within_reach=True)
+        self._checker = prepared.checker
+        return prepared
+
+    def _answered(self, prepared: Prepared, asked: _Asked) -> Cycle:
+        """What was kept, if it still holds, and what is found beside it."""
+        kept, refuted, phases = None, False, asked.phases
+        found = SearchResult(
+            SearchStatus.BUDGET_EXHAUSTED, prepared.conflict, None, None, complete=False, wall_time=0.0
+        )
+        last = self._kept
+        try:
+            with until(asked.at):
+                if last is not None:
+                    with phases("kept"):
+                        kept = verified_again(last, prepared, asked.now)
+                    refuted = kept is None
+                if np.isfinite(prepared.conflict.time):
+                    with phases("occupancy"):
+                        prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
+                    with phases("problem"):
+                        self._source(prepared)
+                guess = last.due(asked.now) if last is not None and refuted else None
+                found = searched(
+                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
+                    guess if guess is not None and guess >= 0.0 else None,
+                )  # fmt: skip
+        except OutOfTime:
+            pass
+        return self._answer(prepared, found, kept, refuted, asked)
+
+    def _source(self, prepared: Prepared) -> Any:
+        return prepared.unguided if self._backend.capabilities.own_way else prepared.source
+
+    def _limited(self, asked: _Asked) -> SearchConfig:
+        settings = self.config.search
+        if asked.at is None:
+            return settings
+        left = max(asked.at - time.perf_counter(), 1e-6)
+        return replace(settings, time_limit=min(left, settings.time_limit or left))
 
     def _step(self, now: float) -> int:
         if not (isinstance(now, int | float) and np.isfinite(now) and now >= 0.0):
@@ -247,8 +319,8 @@ class Repairer:
         return bool(np.isfinite(place).all() and place[0] < self.scene.frame.length - _AHEAD)
 
     def _answer(
-        self, now: float, prepared: Prepared, found: SearchResult, kept: tuple[float, Curve] | None,
-        rebuilt: tuple[str, ...], begin: float,
+        self, prepared: Prepared, found: SearchResult, kept: tuple[float, Curve] | None, refuted: bool,
+        asked: _Asked,
     ) -> Cycle:  # fmt: skip
         f_ttr, part = found.f_ttr, found.curve
         conflicting = found.status not in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING)
@@ -258,45 +330,35 @@ class Repairer:
         curve: Curve = prepared.reference
         if part is not None and f_ttr is not None:
             curve = SplicedCurve(prepared.reference, part, f_ttr)
-            self._kept = KeptRepair(part, f_ttr, now, prepared.scene.frame)
-        elif found.status is not SearchStatus.NO_CONFLICT:
+            if not is_kept:
+                self._kept = KeptRepair(part, f_ttr, asked.now, prepared.scene.frame)
+        elif refuted and found.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
         return Cycle(
-            now, prepared, found, f_ttr, curve, is_kept, found.complete, rebuilt,
-            time.perf_counter() - begin,
+            asked.now, prepared, found, f_ttr, curve, is_kept, found.complete, asked.told,
+            _since(asked.begin),
         )  # fmt: skip
 
 
-def _searched(
-    prepared: Prepared, backend: RepairBackend, settings: SearchConfig, kept: float | None
-) -> SearchResult:
-    """The search; where a repair is kept, only for later ones, from one point of the grid to the next."""
-    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
-    if kept is None or not np.isfinite(end):
-        return find(prepared, backend, settings=settings)
-    begin, found = time.perf_counter(), None
-    probes: tuple[Probe, ...] = ()
-    t_rep = settings.delta_t * (np.floor(kept / settings.delta_t + INSTANT) + 1.0)
-    while t_rep < end - INSTANT:
-        if settings.time_limit is not None:
-            left = settings.time_limit - (time.perf_counter() - begin)
-            settings = replace(settings, time_limit=max(left, 0.0))
-        found = find(prepared, backend, settings=settings, visits=(float(t_rep),))
-        probes += found.probes
-        if found.f_ttr is None or not found.complete:
-            break
-        t_rep += settings.delta_t
-    spent = time.perf_counter() - begin
-    best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
-    complete = found is None or found.complete
-    if best is None:
-        return SearchResult(
-            SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED,
-            prepared.conflict, None, None, probes, complete, spent,
-        )  # fmt: skip
-    return SearchResult(
-        SearchStatus.FOUND, prepared.conflict, best.t_rep, best.solve.curve, probes, complete, spent
-    )
+@dataclass(frozen=True)
+class _Asked:
+    """A cycle that is asked for: when it begins [s] and at which step, since when and until when [s]."""
+
+    now: float
+    step: int
+    begin: float
+    at: float | None
+    phases: Paced
+    rebuilt: list[str] = field(default_factory=list)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What was laid out anew."""
+        return tuple(self.rebuilt)
+
+
+def _since(begin: float) -> float:
+    return time.perf_counter() - begin
 
 
 def _scene_of(road: Any, planning_problem: Any, config: Config) -> Scene:

@@ -50,14 +50,18 @@ def part_in_reach(scene: Scene, settings: RepairConfig, limits: Limits, position
         The reference at the scenario's steps [m].
     """
     (s, aside), (speed, _) = scene.start[:2].tolist()
-    duration, end = (len(positions) - 1) * scene.dt, scene.frame.to_frenet(positions[-1:])[0, 0]
-    ahead = min(max(speed, 0.0) + 0.5 * limits.a_max * duration, max(limits.v_max, speed)) * duration
-    first, last = s - _SLACK, float(np.fmax(s + ahead, end)) + _SLACK
+    end = scene.frame.to_frenet(positions[-1:])[0, 0]
+    # Until the end of each step; the last of them ends where the reference does.
+    t = scene.dt * np.minimum(np.arange(1, len(positions) + 1), len(positions) - 1)
+    ways = np.minimum(max(speed, 0.0) + 0.5 * limits.a_max * t, max(limits.v_max, speed)) * t
+    followed = np.hypot(*(positions - positions[0]).T)
+    ways = np.fmax(ways, np.maximum.accumulate(np.append(followed[1:], followed[-1])))
+    first, last = s - _SLACK, float(np.fmax(s + ways[-1], end)) + _SLACK
     bound = room_of(scene, settings)
     part = slice(*np.searchsorted(bound.s, (first - _SLACK, last + _SLACK)))
     room = max(float(np.abs(side[part]).max(initial=0.0)) for side in (bound.right, bound.left))
     more = settings.margin + settings.clearance + max(settings.widen, default=0.0)
-    return Within(first, last, room + more + abs(aside) + _BESIDE)
+    return Within(s, first, last, room + more + abs(aside) + _BESIDE, ways + _SLACK)
 
 
 @dataclass(frozen=True)

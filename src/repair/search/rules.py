@@ -8,7 +8,7 @@ from repair.errors import ConfigError
 from repair.registry import Registry
 from repair.timegrid import ROUNDING, intervals
 
-__all__ = ["RULES", "IsOpen", "Order", "Rule", "probe_order"]
+__all__ = ["RULES", "IsOpen", "Order", "Rule", "around", "probe_order"]
 
 #: Yields the next t_rep [s], is sent whether it was feasible.
 Order = Generator[float, bool, None]
@@ -39,11 +39,37 @@ def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
 
 def _guided(end: float, delta_t: float, is_open: IsOpen) -> Order:
     size = _grid_size(end, delta_t)
-    feasible, infeasible = -1, size
-    k, stride = _last_open(size, delta_t, is_open), 1
+    order = around(_last_open(size, delta_t, is_open), -1, size)
+    answer: bool | None = None
+    while True:
+        try:
+            k = next(order) if answer is None else order.send(answer)
+        except StopIteration:
+            return
+        answer = yield k * delta_t
+
+
+def around(first: int, feasible: int, size: int) -> Generator[int, bool, None]:
+    """From a point of the grid on to where feasible and infeasible meet.
+
+    Parameters
+    ----------
+    first : int
+        Where to begin.
+    feasible : int
+        The last point that is known to be feasible; -1 where none is.
+    size : int
+        Number of points.
+
+    Yields
+    ------
+    int
+        The next point; sent is whether it was feasible.
+    """
+    infeasible, k, stride = size, first, 1
     while infeasible - feasible > 1:
         k = min(max(k, feasible + 1), infeasible - 1)
-        if (yield k * delta_t):
+        if (yield k):
             feasible = k
         else:
             infeasible = k

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, names
 from repair.timegrid import STEP
 
-__all__ = ["Occupancy"]
+__all__ = ["Occupancy", "nothing"]
 
 _KEPT = 1000  # times of a query whose places among the steps are kept
 
@@ -100,3 +100,9 @@ class Occupancy:
 
     def __len__(self) -> int:
         return len(self.ids)
+
+
+def nothing(t: Array) -> Occupancy:
+    """No obstacles, at times (T,) [s]."""
+    none = frozen(np.empty((0, len(t), 2)))
+    return Occupancy(frozen(t), names([]), none, none, np.empty(0, dtype=np.bool_))

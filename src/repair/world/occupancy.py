@@ -27,15 +27,30 @@ if TYPE_CHECKING:
 __all__ = ["Within", "build_occupancy", "first_entry", "near", "relevant", "shrink_to_start"]
 
 _OUTSIDE = 1e-6  # a reduced box ends this far from where the reference was [m]
+_STANDING = ("static", "environment")
 _STRIDE = 2.0  # of the places of a path that obstacles are held against [m]
 
 
 class Within(NamedTuple):
-    """The part of the road that matters: arc lengths from ``low`` to ``high``, and how far aside [m]."""
+    """Where the ego may be.
 
+    Attributes
+    ----------
+    start : float
+        Where it starts, as an arc length [m].
+    low, high : float
+        The part of the path, likewise.
+    aside : float
+        How far aside of it [m].
+    ways : (K,) array
+        How far from its start by the end of each of the scenario's steps [m]; later it is nowhere.
+    """
+
+    start: float
     low: float
     high: float
     aside: float
+    ways: Array
 
 
 def build_occupancy(
@@ -70,101 +85,118 @@ def build_occupancy(
     """
     steps = len(obstacles[0].vertices) if obstacles else 1
     reach = 0.0 if within is None else within.aside + s_offset + l_offset
-    near = [True] * len(obstacles) if within is None else _near_by(obstacles, frame, within, reach)
-    chosen = [k for k, one in enumerate(near) if one]
-    looked = [obstacles[k] for k in chosen]
-    passes = _project_all(looked, frame) if looked else [[]]
+    near = None if within is None else _near_by(obstacles, frame, within, reach)
+    looked = [_looked_at(k, one, None if near is None else near[k]) for k, one in enumerate(obstacles)]
+    looked = [one for one in looked if len(one.steps)]
     lower, upper = np.full((2, len(obstacles), steps, 2), np.nan)
     more: list[tuple[Array, Array]] = []
     which = list(range(len(obstacles)))
     notes: list[str] = []
     inflate = np.array([s_offset, l_offset])
-    present = [np.asarray(np.isfinite(obstacle.vertices).all(axis=(1, 2))) for obstacle in looked]
-    seen = [np.zeros(steps, dtype=np.bool_) for _ in looked]
-    for turn, projected in enumerate(passes):
-        for j, points in enumerate(projected):
-            low, high, whole = _box(points, present[j], inflate)
+    seen = [np.zeros(len(one.steps), dtype=np.bool_) for one in looked]
+    for turn, projected in enumerate(_project_all(looked, frame)):
+        for j, (one, points) in enumerate(zip(looked, projected, strict=True)):
+            low, high, whole = _box(points, inflate)
             seen[j] |= whole
             if turn == 0:
-                lower[chosen[j]], upper[chosen[j]] = low, high
+                lower[one.row, one.steps], upper[one.row, one.steps] = low, high
             elif np.isfinite(low).any():
-                more.append((low, high))
-                which.append(chosen[j])
-    for j, obstacle in enumerate(looked):
-        hidden = present[j] & ~seen[j]
-        if hidden.any():
-            first = float(np.flatnonzero(hidden)[0] * dt)
+                corners = np.full((2, steps, 2), np.nan)
+                corners[:, one.steps] = low, high
+                more.append((corners[0], corners[1]))
+                which.append(one.row)
+    for one, whole in zip(looked, seen, strict=True):
+        if not whole.all():
+            first = float(one.steps[np.argmin(whole)] * dt)
             notes.append(
-                f"obstacle {obstacle.id} is (partly) outside of the frame's domain from t = {first:g} s; "
-                "only the check of the true shapes sees it there"
+                f"obstacle {obstacles[one.row].id} is (partly) outside of the frame's domain from "
+                f"t = {first:g} s; only the check of the true shapes sees it there"
             )
     if more:
         lower = np.concatenate([lower, [low for low, _ in more]])
         upper = np.concatenate([upper, [high for _, high in more]])
     ids = names(obstacles[k].id for k in which)
-    static = np.array([obstacles[k].role in ("static", "environment") for k in which], dtype=np.bool_)
+    static = np.array([obstacles[k].role in _STANDING for k in which], dtype=np.bool_)
     t = frozen(np.arange(steps) * dt)
     return Occupancy(t, ids, frozen(lower), frozen(upper), static), tuple(notes)
 
 
-def _near_by(obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, reach: float) -> list[bool]:
-    """Whether each obstacle is ever near a part of the path; other shapes than rectangles always count."""
-    kept = [obstacle.rectangles is None for obstacle in obstacles]
-    rows = [k for k, one in enumerate(kept) if not one]
+class _Looked(NamedTuple):
+    """An obstacle, the steps at which it is there and matters, and its outline at these (T, V, 2)."""
+
+    row: int
+    steps: npt.NDArray[np.intp]
+    outline: Array
+
+
+def _looked_at(row: int, obstacle: Obstacle, near: npt.NDArray[np.bool_] | None) -> _Looked:
+    steps = np.arange(len(obstacle.vertices)) if near is None else np.flatnonzero(near)
+    outline = obstacle.vertices[steps]
+    there = np.isfinite(outline).all(axis=(1, 2))
+    return _Looked(row, steps, outline) if there.all() else _Looked(row, steps[there], outline[there])
+
+
+def _near_by(
+    obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, reach: float
+) -> list[npt.NDArray[np.bool_]]:
+    """At which steps each obstacle may be near the ego; other shapes than rectangles always are.
+
+    A step too early and one too late, since boxes are interpolated between the steps.
+    """
+    steps = len(obstacles[0].vertices) if obstacles else 0
+    found = [np.full(steps, obstacle.rectangles is None) for obstacle in obstacles]
+    rows = [k for k, one in enumerate(obstacles) if one.rectangles is not None]
     if not rows:
-        return kept
+        return found
     tables = np.array([obstacles[k].rectangles for k in rows])  # (N, T, 5)
     centre = tables[..., 0] + 1j * tables[..., 1]
-    away = reach + np.hypot(tables[..., 3], tables[..., 4])
+    moved = np.nan_to_num(np.abs(np.diff(centre, axis=1))).max(axis=1, initial=0.0)
+    away = reach + np.hypot(tables[..., 3], tables[..., 4]) + moved[:, None]
     first, last = (np.clip(s, 0.0, frame.length) for s in (within.low, within.high))
     at = np.linspace(first, last, max(int((last - first) / _STRIDE) + 1, 2))
     path = np.ascontiguousarray(frame.position(at)).view(np.complex128)[:, 0]
     away += at[1] - at[0] + max(first - within.low, 0.0) + max(within.high - last, 0.0)
-    # The circle around the part settles most.
-    middle = 0.5 * (path[0] + path[-1])
-    radius = float(np.abs(path - middle).max())
-    i, j = np.nonzero(np.abs(centre - middle) <= radius + away)
+    # How far the ego may be settles most, and so does the circle that this makes.
+    ways = np.full(steps, -np.inf)
+    ways[: len(within.ways)] = within.ways[:steps]
+    i, j = np.nonzero(np.abs(centre - complex(*frame.position(within.start))) <= ways + away)
     close = np.abs(centre[i, j][:, None] - path).min(axis=1, initial=np.inf) <= away[i, j]
-    for k in np.unique(i[close]).tolist():
-        kept[rows[k]] = True
-    return kept
+    near = np.zeros((len(rows), steps + 2), dtype=np.bool_)
+    for shift in (0, 1, 2):
+        near[i[close], j[close] + shift] = True
+    for k, one in zip(rows, near[:, 1:-1], strict=True):
+        found[k] = np.full(steps, one.any()) if obstacles[k].role in _STANDING else one
+    return found
 
 
-def _box(
-    points: Array, present: npt.NDArray[np.bool_], inflate: Array
-) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+def _box(points: Array, inflate: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Inflated corners (T, 2) around what is known of an outline (T, V, 2), and where it is whole.
 
     NaN where nothing is known.
     """
     known = np.isfinite(points[..., 0]) & np.isfinite(points[..., 1])
     whole = np.asarray(known.all(axis=1))
-    lower, upper = np.full((2, len(points), 2), np.nan)
-    clear = whole & present
-    if clear.any():
-        lower[clear] = points[clear].min(axis=1) - inflate
-        upper[clear] = points[clear].max(axis=1) + inflate
-    part = known.any(axis=1) & present & ~whole
+    lower, upper = points.min(axis=1) - inflate, points.max(axis=1) + inflate
+    part = known.any(axis=1) & ~whole
     if part.any():
         masked = np.where(known[part][..., None], points[part], np.nan)
         lower[part] = np.nanmin(masked, axis=1) - inflate
         upper[part] = np.nanmax(masked, axis=1) + inflate
+    lower[~(whole | part)] = upper[~(whole | part)] = np.nan
     return lower, upper, whole
 
 
-def _project_all(obstacles: Sequence[Obstacle], frame: FrenetFrame) -> list[list[Array]]:
+def _project_all(looked: Sequence[_Looked], frame: FrenetFrame) -> list[list[Array]]:
     """Frenet coordinates of all outlines, for each pass of the frame in one call."""
-    shapes = [o.vertices.shape for o in obstacles]
-    stacked = np.concatenate([o.vertices.reshape(-1, 2) for o in obstacles])
-    finite = np.isfinite(stacked).all(axis=1)
+    if not looked:
+        return []
+    shapes = [one.outline.shape for one in looked]
+    stacked = np.concatenate([one.outline.reshape(-1, 2) for one in looked])
     sizes = np.cumsum([s[0] * s[1] for s in shapes])[:-1]
-    passes = []
-    for found in every_pass(frame, stacked[finite]):
-        result = np.full(stacked.shape, np.nan)
-        result[finite] = found
-        parts = zip(np.split(result, sizes), shapes, strict=True)
-        passes.append([part.reshape(shape) for part, shape in parts])
-    return passes
+    return [
+        [part.reshape(shape) for part, shape in zip(np.split(found, sizes), shapes, strict=True)]
+        for found in every_pass(frame, stacked)
+    ]
 
 
 def shrink_to_start(

@@ -24,9 +24,9 @@ from repair.world.tracks import (
     RECTANGLE,
     Index,
     Track,
+    all_tracks,
     as_complex,
     block_samples,
-    tracks_of,
 )
 
 if TYPE_CHECKING:
@@ -75,10 +75,9 @@ class TrackTable:
         self.n_samples, self._block = n_samples, 2 * substeps
         self.tracks: list[Track] = []
         self.owner: list[int] = []
-        for index, obstacle in enumerate(obstacles):
-            for track in tracks_of(obstacle, n_samples, substeps):
-                self.tracks.append(track)
-                self.owner.append(index)
+        for index, track in all_tracks(obstacles, n_samples, substeps):
+            self.tracks.append(track)
+            self.owner.append(index)
         self._build(radius)
 
     def _build(self, own_radius: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +24,7 @@ __all__ = [
     "RECTANGLE",
     "Index",
     "Track",
+    "all_tracks",
     "as_complex",
     "block_samples",
     "ego_room",
@@ -67,14 +69,42 @@ class Track(NamedTuple):
     polygons: tuple[_Parts, ...] = ()
 
 
+def all_tracks(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> list[tuple[int, Track]]:
+    """The tracks of all obstacles, each with its obstacle's index.
+
+    Rectangles that move, which most are, are laid out all at once.
+    """
+    plain = [k for k, o in enumerate(obstacles) if _moves_as_a_rectangle(o)]
+    moved: dict[int, Track] = {}
+    if plain:
+        before, after = _steps(n_samples, substeps)
+        rows = np.array([obstacles[k].rectangles for k in plain])
+        made = _interpolated(rows, before, after, substeps)
+        moved = {k: Track(RECTANGLE, MOVING, row, before) for k, row in zip(plain, made, strict=True)}
+    return [
+        (k, track)
+        for k, one in enumerate(obstacles)
+        for track in ([moved[k]] if k in moved else tracks_of(one, n_samples, substeps))
+    ]
+
+
+def _moves_as_a_rectangle(obstacle: Obstacle) -> bool:
+    return obstacle.rectangles is not None and obstacle.role != "set_based" and not obstacle.late
+
+
+def _steps(n_samples: int, substeps: int) -> tuple[Index, Index]:
+    """The steps at or before samples, and at or after them."""
+    sample = np.arange(n_samples)
+    return sample // substeps, -(-sample // substeps)
+
+
 def tracks_of(obstacle: Obstacle, n_samples: int, substeps: int) -> list[Track]:
     """The tracks of an obstacle.
 
     A set holds from its step to the next and from the step before: what is stated there is their union.
     Polygons that do not move as one body are held likewise, with the hull of both for what lies between.
     """
-    sample = np.arange(n_samples)
-    before, after = sample // substeps, -(-sample // substeps)
+    before, after = _steps(n_samples, substeps)
     kind, rows, polygons = shape_rows(obstacle)
     held = obstacle.role == "set_based"
     rigid = _as_one_body(obstacle, rows) if kind == POLYGON and not held else None
@@ -168,12 +198,18 @@ def _covers(obstacle: Obstacle) -> tuple[Array, tuple[_Parts, ...]]:
 
 
 def _interpolated(rows: Array, before: Index, after: Index, substeps: int) -> Array:
-    """Rows (T, 5) at the samples (S, 5); NaN between a step and one where the obstacle is absent."""
+    """Rows (..., T, 5) at samples (..., S, 5); NaN between a step and one where the obstacle is absent."""
     weight = (np.arange(len(before)) % substeps / substeps)[:, None]
-    left, right = rows[before], rows[after]
-    change = right - left
-    change[:, 2] = wrap(change[:, 2])
-    return np.where(weight > 0.0, left + weight * change, left)
+    left = rows.take(before, axis=-2)
+    if substeps == 1:
+        return left
+    change = rows.take(after, axis=-2)
+    change -= left
+    change[..., 2] = wrap(change[..., 2])
+    change *= weight
+    change += left
+    change[..., ::substeps, :] = left[..., ::substeps, :]  # a step counts alone: the next one may be NaN
+    return change
 
 
 @lru_cache(maxsize=256)

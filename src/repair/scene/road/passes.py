@@ -8,6 +8,8 @@ a while.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from repair.arrays import Array
@@ -21,6 +23,7 @@ _SPACING = 1.0  # of the points that are looked at [m]
 _SHARED = 10.0  # half of what neighbouring stretches have in common, at most [m]
 
 
+@lru_cache(maxsize=8)  # a planner's frame stays the same for many cycles
 def passes(frame: FrenetFrame) -> list[tuple[float, float]]:
     """The stretches of a frame that do not come back to themselves.
 

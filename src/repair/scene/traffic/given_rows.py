@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -63,16 +63,39 @@ def given_obstacles(
         )
         return found, n_steps, [*notes, *more]
     chosen, _, notes = standing_as(things, 0.0, set())
-    tables = [(name, prediction, _table_of(prediction)) for name, prediction in chosen]
-    longest = max((len(table) for _, _, table in tables), default=0) - 1
+    rows = [
+        _Row(name, one, size_of(one), table)
+        for (name, one), table in zip(chosen, _tables(chosen), strict=True)
+    ]
+    longest = max((len(row.table) for row in rows), default=0) - 1
     n_steps = min(longest, steps_max) if longest > 0 else steps_max
-    return _of_tables(tables, n_steps, float(old.dt)), n_steps, notes
+    return _of_tables(rows, n_steps, float(old.dt)), n_steps, notes
+
+
+class _Row(NamedTuple):
+    """An obstacle to be: its id, length and width [m], and poses (T, 3)."""
+
+    id: int
+    prediction: Prediction
+    size: tuple[float, float]
+    table: Array
+
+
+def _tables(chosen: list[tuple[int, Prediction]]) -> list[Array]:
+    """Poses (T, 3) of each, looked at; those that are there throughout, as most are, all at once."""
+    tables = [p.poses for _, p in chosen]
+    if tables and all(_plain(table) for table in tables) and np.isfinite(np.concatenate(tables)).all():
+        return tables
+    return [_table_of(p) for _, p in chosen]
+
+
+def _plain(table: Any) -> bool:
+    return isinstance(table, np.ndarray) and table.dtype == float and table.ndim == 2 and table.shape[1] == 3
 
 
 def _table_of(prediction: Prediction) -> Array:
     """Poses (T, 3), looked at."""
     what = name_of(prediction)
-    size_of(prediction)
     if prediction.poses is None:
         raise ScenarioError(f"{what}: either poses or occupancies are given")
     with foreign(what, ScenarioError):
@@ -81,27 +104,28 @@ def _table_of(prediction: Prediction) -> Array:
     return table[: begin + len(rows)]
 
 
-def _of_tables(tables: list[tuple[int, Prediction, Array]], n_steps: int, dt: float) -> tuple[Obstacle, ...]:
+def _of_tables(rows: list[_Row], n_steps: int, dt: float) -> tuple[Obstacle, ...]:
     """Obstacles of poses (T, 3) each, all at once: there are dozens of them every cycle."""
-    longest = max((len(table) for _, _, table in tables), default=0)
-    poses = np.full((len(tables), max(longest, n_steps + 1), 3), np.nan)
-    for row, (_, _, table) in zip(poses, tables, strict=True):
-        row[: len(table)] = table
+    longest = max((len(row.table) for row in rows), default=0)
+    poses = np.full((len(rows), max(longest, n_steps + 1), 3), np.nan)
+    for place, row in zip(poses, rows, strict=True):
+        place[: len(row.table)] = row.table
     speed = _speeds(poses[:, :longest], dt)
     poses = poses[:, : n_steps + 1]
-    states, rectangles = np.full((2, len(tables), n_steps + 1, 5), np.nan)
+    states, rectangles = np.full((2, len(rows), n_steps + 1, 5), np.nan)
     states[..., :3] = rectangles[..., :3] = poses
     states[:, : speed.shape[1], 3] = speed[:, : n_steps + 1]
-    there = np.isfinite(poses[..., 0])
-    for k, (_, prediction, _) in enumerate(tables):
-        rectangles[k, there[k], 3:] = 0.5 * np.array(size_of(prediction))
-    outlines = [_outline(*size_of(prediction)) for _, prediction, _ in tables]
+    sizes = np.array([row.size for row in rows]).reshape(-1, 1, 2)
+    rectangles[..., 3:] = np.where(np.isfinite(poses[..., :1]), 0.5 * sizes, np.nan)
+    outlines = [_outline(*row.size) for row in rows]
     for made in (states, rectangles):
         made.setflags(write=False)
     vertices = _placed(outlines, poses)
     return tuple(
-        Obstacle(name, one.kind, "dynamic", vertices[k], rectangles[k], None, (), states[k, :, :4])
-        for k, (name, one, _) in enumerate(tables)
+        Obstacle(
+            row.id, row.prediction.kind, "dynamic", vertices[k], rectangles[k], None, (), states[k, :, :4]
+        )
+        for k, row in enumerate(rows)
     )
 
 

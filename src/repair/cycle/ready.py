@@ -1,0 +1,41 @@
+"""Whoever may be asked in a cycle is there before the first one."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from repair.api import make
+from repair.backend.base import RepairBackend
+from repair.config.schema import Config
+from repair.errors import BackendError
+from repair.vehicle.commonroad_ks import load_official
+
+__all__ = ["made_ready"]
+
+
+def made_ready(config: Config) -> RepairBackend:
+    """The backend, with its members, helpers and fallbacks made and what they need imported.
+
+    All of that is made when it is first asked for otherwise, which may be within a deadline.
+
+    Raises
+    ------
+    BackendError
+        If the backend cannot be made.
+    """
+    made = make(config)
+    can = made.capabilities
+    _with_helpers(made)
+    for others in (can.members, can.fallbacks):
+        found = {} if others is None else others()
+        for name in found:
+            with suppress(BackendError):  # one that cannot be made is an error when it is asked
+                _with_helpers(found[name])
+    load_official()
+    return made
+
+
+def _with_helpers(backend: RepairBackend) -> None:
+    for helper in backend.capabilities.helpers.values():
+        with suppress(BackendError):
+            helper()

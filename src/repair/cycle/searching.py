@@ -1,0 +1,82 @@
+"""The search of a cycle: it begins where the last one ended."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from repair.api import find
+from repair.backend.base import RepairBackend
+from repair.preparation import Prepared
+from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.rules import around
+from repair.search.settings import SearchConfig
+from repair.timegrid import INSTANT, intervals
+
+__all__ = ["searched"]
+
+_CONTIGUOUS = ("bisect", "guided")  # rules that take feasibility to be so, and may begin anywhere
+
+
+def searched(
+    prepared: Prepared,
+    backend: RepairBackend,
+    settings: SearchConfig,
+    kept: float | None = None,
+    guess: float | None = None,
+) -> SearchResult:
+    """The F-TTR of a cycle.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    backend : RepairBackend
+    settings : SearchConfig
+    kept : float, optional
+        A time-to-repair at which there is a verified repair [s]: later ones are searched for.
+    guess : float, optional
+        Where it was a cycle ago [s]; with a rule that takes feasibility to be contiguous the search begins
+        there.
+    """
+    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
+    if settings.rule not in _CONTIGUOUS:
+        guess = None
+    if (kept is None and guess is None) or not np.isfinite(end) or end <= 0.0:
+        return find(prepared, backend, settings=settings)
+    begin = time.perf_counter()
+    step = settings.delta_t
+    known = -1 if kept is None else int(np.floor(kept / step + INSTANT))
+    first = int(np.floor((guess or 0.0) / step + INSTANT)) if kept is None else known + 1
+    order = around(first, known, intervals(end, step))
+    probes: tuple[Probe, ...] = ()
+    complete, k = True, next(order, None)
+    while k is not None and complete:
+        left = _left(settings, begin)
+        found = find(prepared, backend, settings=left, visits=(k * step,))
+        probes += found.probes
+        complete = found.complete
+        try:
+            k = order.send(found.f_ttr is not None)
+        except StopIteration:
+            k = None
+    best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
+    if best is None and complete and kept is None and backend.capabilities.fallbacks is not None:
+        return find(prepared, backend, settings=_left(settings, begin))  # which asks the fallbacks
+    spent = time.perf_counter() - begin
+    if best is None:
+        return SearchResult(
+            SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED,
+            prepared.conflict, None, None, probes, complete, spent,
+        )  # fmt: skip
+    return SearchResult(
+        SearchStatus.FOUND, prepared.conflict, best.t_rep, best.solve.curve, probes, complete, spent
+    )
+
+
+def _left(settings: SearchConfig, begin: float) -> SearchConfig:
+    """The settings with what is left of their time."""
+    if settings.time_limit is None:
+        return settings
+    return replace(settings, time_limit=max(settings.time_limit - (time.perf_counter() - begin), 0.0))
