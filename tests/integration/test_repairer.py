@@ -15,6 +15,8 @@ import shapely
 from tests import roads
 
 import repair
+from repair.cycle.paced import Pace, Paced
+from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError, ScenarioError
 
 DOCS = Path(__file__).parents[2] / "docs" / "planner.md"
@@ -205,6 +207,30 @@ def test_where_the_last_search_ended_the_next_one_begins(scene):
     assert cycle.search.probes[0].t_rep > 0.0
     fresh = repair.Repairer(scene, backend="ego").update(plan(scene, 0.1), traffic=nearer, now=0.1)
     assert cycle.f_ttr == fresh.f_ttr
+
+
+def test_who_is_warm_has_kept_nothing_and_knows_how_long_its_parts_take(scene):
+    watch = repair.Repairer(scene, backend="ego", overrides=["fallback=[]"])
+    watch.warm(plan(scene))
+    assert watch._kept is None
+    assert {"traffic", "checker", "conflict", "occupancy"} <= {
+        name for name, pace in watch._paces.items() if pace.expected > 0.0
+    }
+    assert not watch.update(plan(scene, 0.1), now=0.1, deadline=1e-4).complete
+
+
+def test_a_part_is_not_begun_that_would_not_end_in_time():
+    pace = Pace()
+    assert pace.expected == 0.0
+    for seconds in (0.5, 0.01, 0.01, 0.01, 0.012):  # the first one imports something
+        pace.took(seconds)
+    assert 0.012 < pace.expected < 0.02
+    phases = Paced(paces={"a": pace})
+    with until(time.perf_counter() + 0.005), pytest.raises(OutOfTime, match="a takes about"), phases("a"):
+        pytest.fail("it was begun")
+    with until(time.perf_counter() + 5.0), phases("a"):
+        pass
+    assert phases.seconds["a"] < 5.0
 
 
 def test_threads_do_not_meet(scene):
