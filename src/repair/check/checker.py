@@ -13,6 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
+from repair.check.entered import met
 from repair.check.followed import Followed, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
@@ -104,8 +105,7 @@ class Checker:
 
     def contact(self, curve: Curve, t_end: float) -> Contact | None:
         """First contact of the true rectangles along the curve."""
-        known = self._touched
-        if known is not None and known[0] is curve and known[1] == t_end:
+        if (known := self._touched) is not None and known[0] is curve and known[1] == t_end:
             return known[2]
         states = self.drive(curve, t_end)
         return self.world.contact(states.x, states.y, states.orientation)
@@ -158,11 +158,11 @@ class Checker:
 
     def _crosses(self, followed: Followed) -> bool:
         """Whether the reference crosses a gap; asked only where a repair does."""
-        if self._crossing is None or self._crossing[0] is not followed:
+        if (known := self._crossing) is None or known[0] is not followed:
             path = self.scene.frame.carry(self.times(followed.t_end), followed.motion)
-            _, orientation = self.scene.model.angles(path, float(followed.slip[0]))
-            self._crossing = followed, self._gap_under(path, orientation) is not None
-        return self._crossing[1]
+            turned = self.scene.model.angles(path, float(followed.slip[0]))[1]
+            known = self._crossing = followed, self._gap_under(path, turned) is not None
+        return known[1]
 
     def _gap_under(
         self, path: CartesianPath, orientation: Array
@@ -173,8 +173,8 @@ class Checker:
         """A repair that begins at once has to begin with the body as it stands, like the reference."""
         kept = self._kept(problem.reference, problem.t_end)
         turned = abs(float(wrap(orientation - kept.heading + float(kept.slip[0]))))
-        words = f"begins turned by {turned:.3f} rad"
-        return [Violation(Reason.KINEMATICS, 0.0, words)] if turned > _TURNED else []
+        why = Violation(Reason.KINEMATICS, 0.0, f"begins turned by {turned:.3f} rad")
+        return [why] if turned > _TURNED else []
 
     def take_word(self, refused: float, limits: Limits) -> None:
         """Leave the kinematics of references to CommonRoad's drivability checker, which was asked.
@@ -261,10 +261,7 @@ class Checker:
     def _clear(
         self, path: CartesianPath, s: Array, orientation: Array, first_sample: int, t_from: float
     ) -> tuple[list[Violation], Contact | None]:
-        """First contact with an obstacle, or its margin entered, and first departure from the road.
-
-        Also the first contact of the true shapes, which a margin that is entered earlier would hide.
-        """
+        """First contact or margin entered, and first departure from the road; and the first contact."""
         found = []
         centre = path.xy.view(np.complex128)[:, 0]
         obstacle, contact = self._met(centre, orientation, first_sample, path.longest, t_from)
@@ -272,11 +269,10 @@ class Checker:
             found.append(obstacle)
         index = self._off_road(s, centre, orientation)
         if index is not None:
-            assert self.road is not None
             at = centre[index]
             words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
-            words += self.scene.ending_at(place)
-            found.append(Violation(Reason.OFF_ROAD, float(path.t[index]), words, place=place))
+            words, time = words + self.scene.ending_at(place), float(path.t[index])
+            found.append(Violation(Reason.OFF_ROAD, time, words, place=place))
         return found, contact
 
     def _met(
@@ -294,16 +290,7 @@ class Checker:
         # Who never enters a margin touches nothing, but for the margins that do not count.
         unsure = near is not None or bool(self._beside) or since > 0
         contact = self.world.contact_along(centre, orientation, first, step) if margin and unsure else near
-        if contact is not None and (near is None or contact.time <= near.time):
-            behind = " from behind" if contact.from_behind else ""
-            detail = f"obstacle {contact.obstacle_id}{behind}"
-            return Violation(Reason.COLLISION, contact.time, detail, contact.obstacle_id), contact
-        if near is None:
-            return None, contact
-        detail = f"obstacle {near.obstacle_id} within {margin:g} m"
-        if contact is not None:
-            detail += f", contact with obstacle {contact.obstacle_id} at {contact.time:.2f} s"
-        return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id), contact
+        return met(near, contact, margin), contact
 
     def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
         """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
@@ -357,8 +344,7 @@ class Checker:
         if not self._checks:
             return []
         states = self.scene.model.states(path.t, path.xy, path.speed, slip, orientation)
-        driven = Driven(problem, path, states, late)
-        return violations_of(self._checks, driven)
+        return violations_of(self._checks, Driven(problem, path, states, late))
 
 
 _NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))

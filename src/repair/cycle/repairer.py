@@ -10,13 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from repair.api import RepairResult
-from repair.arrays import Array, frozen
+from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.config.load import load_config
@@ -27,28 +26,24 @@ from repair.cycle.ego import ego_of
 from repair.cycle.kept import KeptRepair, verified_again
 from repair.cycle.paced import LEAST, Pace, Paced
 from repair.cycle.ready import made_ready
+from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
-from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError, in_words, kind_of
+from repair.errors import ConfigError, ReferenceTrajectoryError, in_words, kind_of
 from repair.outcome.data import Outcome
 from repair.preparation import Prepared, laid_out
 from repair.reference.given import GivenReference, given_reference
-from repair.scene.commonroad import load_scene, moved_on
+from repair.scene.commonroad import moved_on
 from repair.scene.reframe import lanes_at, reframe
 from repair.scene.road.lanes import Lane
-from repair.scene.scene import InitialState, Scene
-from repair.scene.traffic.given_rows import given_obstacles
-from repair.scene.traffic.obstacle import Obstacle, later
+from repair.scene.scene import Scene
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import SearchConfig
-from repair.timegrid import INSTANT, steps_until
+from repair.timegrid import INSTANT
 
 __all__ = ["Cycle", "Repairer"]
 
-_BESIDE = 0.2  # a plan further beside the kept frame's path gets one of its own [m]; smoothing takes 0.1
 _AHEAD = 20.0  # so much of the frame has to be left beyond the plan [m]
-_LEAST = 3  # steps of a horizon
-_HORIZON = 10.0  # unless ``scene.horizon`` says another [s]
 
 
 class Repairer:
@@ -86,7 +81,7 @@ class Repairer:
         source = replace(config, reference=replace(config.reference, source="given"))
         source.given = config.given - {"reference.source"}
         self.config = source
-        self.scene = _scene_of(road, planning_problem, config)
+        self.scene = scene_of(road, planning_problem, config)
         self._first = self.scene
         self._start()
 
@@ -203,7 +198,7 @@ class Repairer:
             with phases("plan"):
                 state = ego_of(ego, reference, self.scene)
             with phases("traffic"):
-                scene = self._now(asked.step, state, traffic)
+                scene = scene_now(self.scene, self._first, asked.step, state, traffic)
             with phases("given"):
                 given = given_reference(reference, scene)
         before = self._framed
@@ -261,33 +256,6 @@ class Repairer:
             raise ConfigError(f"now is {now:g} s; it has to be a multiple of the step of {self.scene.dt:g} s")
         return step
 
-    def _now(self, step: int, ego: InitialState, traffic: Iterable[Any] | None) -> Scene:
-        """The scene of the cycle, on the road's own frame."""
-        base = self.scene
-        first = self._first.initial_time_step + step
-        notes: list[str] = []
-        if traffic is None:
-            obstacles: tuple[Obstacle, ...] = tuple(
-                o for o in (later(o, step) for o in self._first.obstacles) if o is not None
-            )
-            n_steps = self._first.n_steps - step
-            if n_steps < _LEAST:
-                end = self._first.horizon
-                raise ScenarioError(
-                    f"the scenario's own traffic ends at {end:g} s, and now is {step * base.dt:g} s"
-                )
-        else:
-            obstacles, n_steps, notes = given_obstacles(
-                base.scenario, first, traffic,
-                after_prediction=base.settings.after_prediction,
-                steps_max=steps_until(base.settings.horizon or _HORIZON, base.dt),
-            )  # fmt: skip
-        start = frozen([base.start[0], [ego.velocity, 0.0], [ego.acceleration, 0.0]])
-        return replace(
-            base, initial_state=ego, start=start, obstacles=obstacles, n_steps=n_steps,
-            horizon=n_steps * base.dt, initial_time_step=first, recorded_ego=None, notes=tuple(notes),
-        )  # fmt: skip
-
     def _frame(self, scene: Scene, given: GivenReference, rebuilt: list[str]) -> tuple[Scene, Checker | None]:
         """The scene in a frame along the plan: the kept one where the plan is on its path, else a new one."""
         positions = given.positions
@@ -295,8 +263,8 @@ class Repairer:
         kept = self._framed
         if kept is not None:
             places = kept.frame.to_frenet(positions)
-            if _fits(places, kept.frame.length, self._room):
-                return _in(kept, scene, places[0]), self._checker
+            if fits(places, kept.frame.length, self._room):
+                return in_frame(kept, scene, places[0]), self._checker
             rebuilt.append("frame: the plan leaves the path of the last one")
         if not self._within(positions):
             self.scene = moved_on(self._first, scene.initial_state)
@@ -361,37 +329,6 @@ def _since(begin: float) -> float:
     return time.perf_counter() - begin
 
 
-def _scene_of(road: Any, planning_problem: Any, config: Config) -> Scene:
-    from repair.scene.commonroad import scene_from_scenario
-
-    if isinstance(road, Scene):
-        return road
-    if hasattr(road, "lanelet_network"):
-        return scene_from_scenario(road, planning_problem, config)
-    if not isinstance(road, str | Path):
-        raise ScenarioError(f"a road is a scene, a path or a CommonRoad scenario, not {kind_of(road)}")
-    return load_scene(road, config)
-
-
 def _spare(deadline: float) -> float:
     """What is left for making the answer of what was found [s]."""
     return min(5e-4, 0.1 * deadline)
-
-
-def _fits(places: Array, length: float, room: float) -> bool:
-    """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have."""
-    return bool(
-        np.isfinite(places).all()
-        and np.abs(places[:, 1]).max() <= _BESIDE
-        and places[0, 0] > 1.0
-        and places[-1, 0] <= length - room + INSTANT
-    )
-
-
-def _in(kept: Scene, scene: Scene, place: Array) -> Scene:
-    """The scene of this cycle in the frame of another one."""
-    start = frozen([place, scene.start[1], scene.start[2]])
-    return replace(
-        scene, frame=kept.frame, start=start, route_end_s=kept.route_end_s, goal_s=kept.goal_s,
-        lane=kept.lane, same_direction=kept.same_direction, road=kept.road, speed_limit=kept.speed_limit,
-    )  # fmt: skip

@@ -1,0 +1,102 @@
+"""The scene of a cycle: the road as it is kept, the ego and the traffic as they are now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from repair.arrays import Array, frozen
+from repair.config.schema import Config
+from repair.errors import ScenarioError, kind_of
+from repair.scene.commonroad import load_scene, scene_from_scenario
+from repair.scene.scene import InitialState, Scene
+from repair.scene.traffic.given_rows import given_obstacles
+from repair.scene.traffic.obstacle import Obstacle, later
+from repair.timegrid import INSTANT, steps_until
+
+__all__ = ["fits", "in_frame", "scene_now", "scene_of"]
+
+_BESIDE = 0.2  # a plan further beside the kept frame's path gets one of its own [m]; smoothing takes 0.1
+_LEAST = 3  # steps of a horizon
+_HORIZON = 10.0  # unless ``scene.horizon`` says another [s]
+
+
+def scene_of(road: Any, planning_problem: Any, config: Config) -> Scene:
+    """The scene of whatever a road is given as."""
+    if isinstance(road, Scene):
+        return road
+    if hasattr(road, "lanelet_network"):
+        return scene_from_scenario(road, planning_problem, config)
+    if not isinstance(road, str | Path):
+        raise ScenarioError(f"a road is a scene, a path or a CommonRoad scenario, not {kind_of(road)}")
+    return load_scene(road, config)
+
+
+def scene_now(
+    base: Scene, recorded: Scene, step: int, ego: InitialState, traffic: Iterable[Any] | None
+) -> Scene:
+    """The scene of a cycle, on the road's own frame.
+
+    Parameters
+    ----------
+    base : Scene
+        The road that is laid out.
+    recorded : Scene
+        Whose traffic it is where none is given.
+    step : int
+        When the cycle begins.
+    ego : InitialState
+    traffic : iterable, optional
+        See :meth:`repair.Repairer.update`.
+
+    Raises
+    ------
+    ScenarioError
+        If the traffic cannot be used, or ends too soon.
+    """
+    first = recorded.initial_time_step + step
+    notes: list[str] = []
+    if traffic is None:
+        obstacles: tuple[Obstacle, ...] = tuple(
+            o for o in (later(o, step) for o in recorded.obstacles) if o is not None
+        )
+        n_steps = recorded.n_steps - step
+        if n_steps < _LEAST:
+            end = recorded.horizon
+            raise ScenarioError(
+                f"the scenario's own traffic ends at {end:g} s, and now is {step * base.dt:g} s"
+            )
+    else:
+        obstacles, n_steps, notes = given_obstacles(
+            base.scenario, first, traffic,
+            after_prediction=base.settings.after_prediction,
+            steps_max=steps_until(base.settings.horizon or _HORIZON, base.dt),
+        )  # fmt: skip
+    start = frozen([base.start[0], [ego.velocity, 0.0], [ego.acceleration, 0.0]])
+    return replace(
+        base, initial_state=ego, start=start, obstacles=obstacles, n_steps=n_steps,
+        horizon=n_steps * base.dt, initial_time_step=first, recorded_ego=None, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def fits(places: Array, length: float, room: float) -> bool:
+    """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have."""
+    return bool(
+        np.isfinite(places).all()
+        and np.abs(places[:, 1]).max() <= _BESIDE
+        and places[0, 0] > 1.0
+        and places[-1, 0] <= length - room + INSTANT
+    )
+
+
+def in_frame(kept: Scene, scene: Scene, place: Array) -> Scene:
+    """The scene of this cycle in the frame of another one."""
+    start = frozen([place, scene.start[1], scene.start[2]])
+    return replace(
+        scene, frame=kept.frame, start=start, route_end_s=kept.route_end_s, goal_s=kept.goal_s,
+        lane=kept.lane, same_direction=kept.same_direction, road=kept.road, speed_limit=kept.speed_limit,
+    )  # fmt: skip
