@@ -41,10 +41,8 @@ from repair.situation import Situation
 from repair.solvers.registry import sections
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.vehicle.parameters import Vehicle
-from repair.world.boxes import Occupancy
-from repair.world.laid import Boxes
+from repair.world.boxes import Boxes, Occupancy, shrink_to_start
 from repair.world.occupancy import Within, build_occupancy
-from repair.world.start_margins import shrink_to_start
 
 __all__ = ["Phases", "Prepared", "again_for", "among", "laid_out", "prepare", "what_matters"]
 

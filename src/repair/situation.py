@@ -21,9 +21,8 @@ from repair.terminal.required import SafeEnds
 from repair.terminal.room import RoomToStop, room_to_stop
 from repair.terminal.verdict import Terminal
 from repair.timegrid import on_grid
-from repair.world.boxes import Occupancy, nothing
+from repair.world.boxes import Boxes, Occupancy, nothing
 from repair.world.dead_ends import dead_ends, with_boxes
-from repair.world.laid import Boxes
 
 if TYPE_CHECKING:
     from repair.scene.scene import Scene

@@ -14,9 +14,8 @@ from repair.arrays import frozen
 from repair.curves.base import FrenetTrajectory
 from repair.scene.frame import FrenetFrame
 from repair.scene.traffic.obstacle import Obstacle
-from repair.world.boxes import Occupancy
+from repair.world.boxes import Occupancy, shrink_to_start
 from repair.world.occupancy import build_occupancy, first_entry, relevant
-from repair.world.start_margins import shrink_to_start
 
 STRAIGHT = FrenetFrame.from_points([[0.0, 0.0], [200.0, 0.0]])
 _TURN = np.linspace(0.0, 0.5 * np.pi, 60)

@@ -16,9 +16,8 @@ from repair.preparation import prepare
 from repair.reference import consistency
 from repair.scene.commonroad import load_scene
 from repair.scene.reframe import reframe
-from repair.world.boxes import Occupancy
+from repair.world.boxes import Occupancy, shrink_to_start
 from repair.world.occupancy import first_entry
-from repair.world.start_margins import shrink_to_start
 
 FIELDS = ("x", "y", "steeringAngle", "velocity", "orientation")
 

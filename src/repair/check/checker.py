@@ -13,7 +13,6 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.entered import met
 from repair.check.followed import Followed, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
@@ -26,7 +25,7 @@ from repair.check.limits import (
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
-from repair.check.verdict import Reason, Verdict, Violation
+from repair.check.verdict import Reason, Verdict, Violation, met
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import STANDSTILL
 from repair.problem.limits import Limits
@@ -268,7 +267,7 @@ class Checker:
         if obstacle is not None:
             found.append(obstacle)
         index = self._off_road(s, centre, orientation)
-        if index is not None:
+        if index is not None and self.road is not None:
             at = centre[index]
             words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
             words, time = words + self.scene.ending_at(place), float(path.t[index])

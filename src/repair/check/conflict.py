@@ -11,7 +11,7 @@ from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.curves.base import Curve
 from repair.timegrid import on_grid, steps_until
 from repair.world.advance import FINEST
-from repair.world.laid import Boxes
+from repair.world.boxes import Boxes
 from repair.world.occupancy import first_entry
 
 __all__ = ["detect_conflict"]
