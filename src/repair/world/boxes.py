@@ -1,4 +1,4 @@
-"""Obstacles as boxes in (s, l, t), where times lie among their steps, and what counts of them at the start."""
+"""Obstacles as boxes in (s, l, t): where times lie among their steps, what counts of them at the start."""
 
 from __future__ import annotations
 
