@@ -40,6 +40,9 @@ class Source:
     def widened(self, t_rep):
         return ()
 
+    def without_guide(self, t_rep):
+        return self.at(t_rep)
+
     def along(self, manoeuvre, kind, *, jumps=False):
         self.along_asked.append((manoeuvre, kind))
         return self.at(manoeuvre.t_start)[0]
@@ -190,3 +193,50 @@ def test_a_verified_curve_that_keeps_all_rows_is_kept_as_it_is():
     assert (
         backend.solve(problem, warm_start=earlier).closest is None
     )  # of another t_rep: a neighbour, no more
+
+
+# ------------------------------------------------------------------ what is proven to be too late
+
+
+@dataclass
+class Slow:
+    """Finds its own way, and says what it was asked."""
+
+    asked: list = field(default_factory=list)
+    capabilities = Capabilities(own_way=True)
+    name = "slow"
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        self.asked.append(round(problem.t_rep, 6))
+        curve = fit_to_curve(toy.constant(10.0), problem.t_rep, 13, 3, 0.2)
+        return SolveResult(SolveStatus.SOLVED, curve=curve, objective=1.0)
+
+
+def searched(backend, after=None, **keys):
+    settings = SearchConfig(delta_t=0.4, rule="scan", **keys)
+    return search_f_ttr(
+        Source(), Conflict(2.9, "margin", 7, 2.95), backend, Until(1.6), settings,
+        after=after, hopeless=lambda t_rep: t_rep > 1.9,
+    )  # fmt: skip
+
+
+def test_after_a_repair_nobody_is_asked_at_a_time_that_is_proven_to_be_too_late():
+    slow = Slow()
+    first = searched(slow).probes[1]
+    assert slow.asked == [0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8]  # by itself it is not held up by proofs
+    slow.asked.clear()
+    found = searched(slow, after=first)
+    assert found.f_ttr == pytest.approx(1.6)
+    assert slow.asked == [0.8, 1.2, 1.6]
+    assert [p.t_rep for p in found.probes if not p.feasible] == pytest.approx([2.0, 2.4, 2.8])
+    slow.asked.clear()
+    searched(slow, after=first, proofs=False)
+    assert slow.asked[-1] == 2.8
+
+
+def test_a_hard_backend_asks_no_helper_at_a_time_that_is_proven_to_be_too_late():
+    source = Slow()
+    hard = Hard(Capabilities(helpers={"slow": lambda: source}))
+    found = searched(hard)
+    assert source.asked == [0.0, 0.4, 0.8, 1.2, 1.6]
+    assert all("no further: it is proven to be too late" in p.tried for p in found.probes if p.t_rep > 1.9)

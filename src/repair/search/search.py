@@ -81,7 +81,9 @@ def iter_probes(
         if budget.spent:
             raise OutOfTime
         with budget.watched():
-            first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
+            # After a repair most of what is left is too late: who takes long and knows no sides asks first.
+            late = after is not None and backend.capabilities.own_way and _hopeless(t_rep, budget)
+            first = () if late else made.pop(t_rep) if t_rep in made else source.at(t_rep)
             probe = _visit(t_rep, first, source, backend, checker, settings.sides, warm_start, budget)
         if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
@@ -140,7 +142,7 @@ def _visit(
     probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
     if probe.feasible:
         return probe
-    if _hopeless(t_rep, backend, budget):
+    if (backend.capabilities.relaxes or backend.capabilities.helpers) and _hopeless(t_rep, budget):
         return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
     tightens = any(source.notches)
     if tightens:
@@ -176,10 +178,10 @@ def _visit(
     return probe
 
 
-def _hopeless(t_rep: float, backend: RepairBackend, budget: Budget) -> bool:
-    """Whether it is proven that more of a backend that takes its time finds nothing at a t_rep either."""
-    can, left = backend.capabilities, budget.left
-    if budget.hopeless is None or not (can.relaxes or can.helpers) or (left is not None and left < _HELP):
+def _hopeless(t_rep: float, budget: Budget) -> bool:
+    """Whether it is proven that nothing is feasible at a t_rep; asked for backends that take their time."""
+    left = budget.left
+    if budget.hopeless is None or (left is not None and left < _HELP):
         return False
     try:
         return budget.hopeless(t_rep)
