@@ -267,6 +267,21 @@ WRONG = {
         lambda s: {"ego": {"x": np.nan, "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "not finite"
     ),
     "a letter": (lambda s: {"ego": {"x": "a", "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "no number"),
+    "a kind of car": (
+        lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, kind="spaceship")]},
+        ScenarioError, "no kind 'spaceship'",
+    ),
+    "a chance": (
+        lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, probability=2.0)]},
+        ScenarioError, "its probability is 2.0",
+    ),
+    "no poses": (
+        lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 2)), 4.0, 2.0)]}, ScenarioError, "of shape"
+    ),
+    "a hole": (
+        lambda s: {"traffic": [repair.Prediction(3, [[0.0] * 3, [np.nan] * 3, [0.0] * 3], 4.0, 2.0)]},
+        ScenarioError, "has a hole",
+    ),
     "traffic": (lambda s: {"traffic": 5}, ScenarioError, "has to be a list"),
 }  # fmt: skip
 

@@ -194,3 +194,10 @@ def test_a_result_with_traffic_from_memory_is_certified(scene, tmp_path):
     assert (tmp_path / f"{scene.id}.xml").is_file()
     certificate = certify(tmp_path)
     assert certificate.ok, format_certificate(certificate)
+
+
+def test_what_is_handed_over_stays_as_it_is(scene):
+    """Headings are brought into the range that CommonRoad takes in a copy."""
+    poses = np.tile([scene.initial_state.x + 40.0, scene.initial_state.y, 7.0], (20, 1))
+    answer(scene, [repair.Prediction(7, poses, 4.0, 1.8)])
+    assert (poses[:, 2] == 7.0).all()

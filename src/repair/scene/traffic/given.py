@@ -6,6 +6,7 @@ Predictions become CommonRoad obstacles, so that they are read, judged and writt
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from numbers import Integral
 from typing import Any
 
@@ -125,8 +126,7 @@ def _obstacle(prediction: Prediction, name: int, first: int, dt: float) -> Any:
     what = name_of(prediction)
     if (prediction.poses is None) == (prediction.occupancies is None):
         raise ScenarioError(f"{what}: either poses or occupancies are given")
-    if not 0.0 <= prediction.probability <= 1.0:
-        raise ScenarioError(f"{what}: its probability is {prediction.probability!r}")
+    require_probability(prediction, what)
     with foreign(what, ScenarioError):
         if prediction.poses is None:
             return _set_based(prediction, name, first, what)
@@ -136,11 +136,40 @@ def _obstacle(prediction: Prediction, name: int, first: int, dt: float) -> Any:
 def _type(kind: str, what: str) -> Any:
     from commonroad.scenario.obstacle import ObstacleType
 
-    try:
-        return ObstacleType(kind)
-    except ValueError as error:
-        known = ", ".join(sorted(member.value for member in ObstacleType))
-        raise ScenarioError(f"{what}: there is no kind {in_words(kind)}; there are {known}") from error
+    require_kind(kind, what)
+    return ObstacleType(kind)
+
+
+@cache
+def _kinds() -> frozenset[str]:
+    from commonroad.scenario.obstacle import ObstacleType
+
+    return frozenset(member.value for member in ObstacleType)
+
+
+def require_kind(kind: str, what: str) -> None:
+    """Refuse a kind of obstacle that CommonRoad does not know.
+
+    Raises
+    ------
+    ScenarioError
+        With those that there are.
+    """
+    if not isinstance(kind, str) or kind not in _kinds():
+        known = ", ".join(sorted(_kinds()))
+        raise ScenarioError(f"{what}: there is no kind {in_words(kind)}; there are {known}")
+
+
+def require_probability(prediction: Prediction, what: str) -> None:
+    """Refuse a probability that is none.
+
+    Raises
+    ------
+    ScenarioError
+        With what it is.
+    """
+    if not 0.0 <= prediction.probability <= 1.0:
+        raise ScenarioError(f"{what}: its probability is {prediction.probability!r}")
 
 
 def known_rows(poses: Any, what: str) -> tuple[int, Array]:
@@ -171,6 +200,7 @@ def _moving(prediction: Prediction, name: int, first: int, dt: float, what: str)
 
     length, width = size_of(prediction)
     begin, rows = known_rows(prediction.poses, what)
+    rows = rows.copy()  # they are the caller's
     rows[:, 2] = np.arctan2(np.sin(rows[:, 2]), np.cos(rows[:, 2]))
     shape = Rectangle(length, width)
     speed = speeds_along(rows, dt)

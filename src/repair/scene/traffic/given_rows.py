@@ -10,7 +10,14 @@ import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.errors import ScenarioError, foreign
-from repair.scene.traffic.given import given_scenario, known_rows, speeds_along, standing_as
+from repair.scene.traffic.given import (
+    given_scenario,
+    known_rows,
+    require_kind,
+    require_probability,
+    speeds_along,
+    standing_as,
+)
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.scene.traffic.prediction import Prediction, name_of, size_of
@@ -63,6 +70,9 @@ def given_obstacles(
         )
         return found, n_steps, [*notes, *more]
     chosen, _, notes = standing_as(things, 0.0, set())
+    for _, one in chosen:
+        require_probability(one, name_of(one))
+        require_kind(one.kind, name_of(one))
     rows = [
         _Row(name, one, size_of(one), table)
         for (name, one), table in zip(chosen, _tables(chosen), strict=True)
