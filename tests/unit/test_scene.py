@@ -469,7 +469,7 @@ def test_a_default_configuration_takes_what_the_scene_has(file: Path, tmp_path: 
     result.save(tmp_path / "out", figure=False)
     assert load_result(tmp_path / "out").record["config"]["scene"] == recorded
     # What is recorded makes the same result of the file again.
-    again = repair(file, recorded_config(result.to_dict()["config"]))
+    again = repair(file, recorded_config(result.to_dict()))
     assert again.f_ttr == result.f_ttr
     assert again.prepared.scene.settings == taken.scene
 

@@ -11,7 +11,6 @@ answers of the CommonRoad drivability checker on the solution file.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -40,7 +39,7 @@ from repair.certify.traffic import Traffic, read_traffic
 from repair.curves.base import Curve, SplicedCurve
 from repair.curves.codec import read_curve
 from repair.errors import RepairError
-from repair.io.result_json import read_record
+from repair.io.result_json import read_record, scenario_of
 from repair.onward.leg import Leg, leg_from_dict
 from repair.terminal.traffic import traffic_until
 from repair.timegrid import steps_until
@@ -190,16 +189,8 @@ def _prepare(folder: Path, content: Mapping[str, Any]) -> tuple[Path, Prepared]:
     from repair.scene.commonroad import load_scene
 
     origin = content.get("provenance") or {}
-    beside = content.get("scenario_file")
-    path = folder / beside if beside else Path(str(origin.get("path") or ""))
-    if not path.is_file():
-        raise RepairError(f"the scenario {path} of the result is not there any more")
-    wanted = origin.get("sha256") or content.get("scenario_sha256")
-    if not wanted:
-        raise RepairError(f"{folder} does not say by its checksum which scenario it was made from")
-    if hashlib.sha256(path.read_bytes()).hexdigest() != wanted:
-        raise RepairError(f"the scenario {path} is not the one the result was made from (checksum)")
-    config = recorded_config(content["config"])
+    path = scenario_of(folder, content)
+    config = recorded_config(content)
     scene = load_scene(path, config)
     if scene.planning_problem_id != origin.get("planning_problem_id"):
         raise RepairError(

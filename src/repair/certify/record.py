@@ -21,7 +21,8 @@ __all__ = ["Again", "differences", "other_versions", "record_rows", "searched_ag
 _FREE = frozenset(
     {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
      "scenario_file_problem", "report_file", "report_file_problem", "modes", "drawing_file", "provenance",
-     "config", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound", "explanation"}
+     "config", "config_given", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound",
+     "explanation"}
 )  # fmt: skip
 #: What follows from the scenario, the configuration and the curve alone. Not how it ends: a stop is driven on
 #: from the curve's very end, and makes more of its last digits than they say.

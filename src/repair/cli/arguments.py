@@ -31,8 +31,9 @@ def configuration_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--preset", metavar="NAME", help="a published setting; see `repair presets`")
     parser.add_argument(
-        "--config", metavar="FILE", type=Path, help="YAML file; see `repair config` for the keys"
-    )
+        "--config", metavar="FILE", type=Path,
+        help="YAML file, see `repair config` for the keys; or the result.json of a repair",
+    )  # fmt: skip
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="extend", nargs="+", default=[], dest="overrides",
         help="configuration keys, such as search.delta_t=0.1; the last word",

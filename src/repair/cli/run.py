@@ -20,7 +20,13 @@ from repair.cli.arguments import (
 )
 from repair.cli.streams import as_json
 from repair.errors import RepairError
-from repair.paper.bundled import OFFICIAL_FILES, PAPER_SCENARIOS, find_scenario, paper_scenario
+from repair.paper.bundled import (
+    OFFICIAL_FILES,
+    PAPER_SCENARIOS,
+    find_scenario,
+    paper_scenario,
+    reconstruction_by,
+)
 
 if TYPE_CHECKING:
     from repair.config import Config
@@ -58,8 +64,11 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
-    """The scenario's file and the configuration; the paper's scenarios come with their presets."""
+def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config, Any]]:
+    """The scenario's file, the configuration, and a reference that a stored result was given.
+
+    The paper's scenarios come with their presets; a stored result with its own scenario.
+    """
     if arguments.bound:
         arguments.overrides = [*arguments.overrides, "bound.wanted=true"]
     if arguments.explain:
@@ -69,13 +78,43 @@ def _scenario(arguments: argparse.Namespace) -> Iterator[tuple[Path, Config]]:
     if arguments.to_goal:
         arguments.overrides = [*arguments.overrides, "repair.goal=true"]
     config = resolve(arguments)
+    from repair.config.layers import result_in
+    from repair.io.result_json import record_in
+
+    if arguments.config is not None and result_in(arguments.config) is not None:
+        content = record_in(arguments.config)
+        given = content.get("given_reference") if config.reference.source == "given" else None
+        with _stored(arguments, content) as path:
+            yield path, config, given
+        return
     name = arguments.scenario or config.scenario
     default = arguments.preset if arguments.preset in PAPER_SCENARIOS else PAPER_SCENARIOS[0]
     if arguments.preset is None and (name is None or name in PAPER_SCENARIOS):
         arguments.preset = name or default
         config = resolve(arguments)
     with paper_scenario(default) if name is None else find_scenario(name) as path:
-        yield path, config
+        yield path, config, None
+
+
+@contextmanager
+def _stored(arguments: argparse.Namespace, content: dict[str, Any]) -> Iterator[Path]:
+    """The scenario of a stored result, unless another one is named."""
+    from repair.io.result_json import scenario_of
+
+    if content.get("modes"):
+        raise RepairError(
+            f"{arguments.config} is of several predictions of one obstacle, which were given from memory; "
+            "only a program can run that again"
+        )
+    origin = content["provenance"]
+    if arguments.scenario is not None:
+        with find_scenario(arguments.scenario) as path:
+            yield path
+    elif origin["kind"] == "reconstruction" and not content.get("scenario_file"):
+        with reconstruction_by(origin["sha256"]) as path:
+            yield path
+    else:
+        yield scenario_of(arguments.config.parent, content)
 
 
 class _Interrupts:
@@ -134,12 +173,12 @@ def run(arguments: argparse.Namespace) -> int:
         require_folder(arguments.out)
     if style is not None and (arguments.out is None or arguments.no_figure):
         raise UsageError("--format, --width and --font-size say how figures are written; they need --out DIR")
-    with _Interrupts() as interrupts, _scenario(arguments) as (path, config):
+    with _Interrupts() as interrupts, _scenario(arguments) as (path, config, given):
         from repair.api import repair
         from repair.io.result_json import to_json
         from repair.report.text import summary
 
-        result = repair(path, config, on_found=interrupts.found, on_explaining=_progress())
+        result = repair(path, config, on_found=interrupts.found, on_explaining=_progress(), reference=given)
         content, problem = result.to_dict(), None
         written: list[Path] = []
         if arguments.out is not None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from repair.errors import ConfigError, in_words, kind_of
 
-__all__ = ["Layer", "dotted", "explain", "merged", "read_yaml", "require_sections"]
+__all__ = ["Layer", "dotted", "explain", "merged", "read_yaml", "require_sections", "result_in"]
 
 
 class Layer(NamedTuple):
@@ -40,6 +41,18 @@ def read_yaml(path: Path) -> Any:
     if not isinstance(layer, DictConfig):
         raise ConfigError(f"configuration file {path} must hold a mapping of keys")
     return layer
+
+
+def result_in(path: Path) -> Mapping[str, Any] | None:
+    """What a JSON file holds, where that is the result of a repair; None where it is anything else."""
+    if path.suffix != ".json":
+        return None
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None  # what is wrong with it is said where it is read as settings
+    known = isinstance(content, dict) and "status" in content and isinstance(content.get("config"), dict)
+    return content if known else None
 
 
 def dotted(overrides: Iterable[str] | Mapping[str, Any]) -> Any:

@@ -11,7 +11,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from repair.config.layers import Layer, dotted, explain, merged, read_yaml, require_sections
+from repair.config.layers import Layer, dotted, explain, merged, read_yaml, require_sections, result_in
 from repair.config.schema import Config, configuration_keys, key_names, schema, values_of, words_of
 from repair.errors import ConfigError, in_words, path_of
 from repair.settings import require_sane
@@ -54,7 +54,7 @@ def load_config(
     preset : str, optional
         Name of a bundled preset (see :func:`preset_names`).
     file : path, optional
-        YAML file of the same schema.
+        YAML file of the same schema, or the ``result.json`` of a repair: the settings that it was made with.
     overrides : iterable of ``"key=value"`` or mapping of dotted keys
         Last word on everything except what ``for_backend`` says.
     **named
@@ -66,29 +66,51 @@ def load_config(
         Naming the key, what it got and what it expects.
     """
     layers: list[Layer] = []
+    given = frozenset[str]()
     if preset is not None:
         layers.append(Layer(f"preset {preset}", read_yaml(preset_path(preset))))
     if file is not None:
         path = path_of(file, "a configuration file", ConfigError)
-        layers.append(Layer(str(path), read_yaml(path)))
+        record = result_in(path)
+        node = read_yaml(path) if record is None else _recorded(record["config"])
+        given = _given_of(record or {})
+        if record is not None and preset is not None:
+            raise ConfigError(f"preset {preset!r} has no effect: the result {path} holds every key")
+        layers.append(Layer(str(path), node))
     own = [Layer("overrides", dotted(overrides)), Layer("overrides", dotted(_named(named)))]
     config = _resolved(layers, own)
+    config.given |= given
     _require_effect(config)
     return config
 
 
-def recorded_config(values: Mapping[str, Any]) -> Config:
-    """The configuration that :meth:`Config.to_dict` gave, in this version or an earlier one.
+def recorded_config(record: Mapping[str, Any]) -> Config:
+    """The configuration that a result was made with, in this version or an earlier one.
 
-    Nothing in it counts as set on purpose: what had no effect then has none now.
+    Parameters
+    ----------
+    record : mapping
+        What ``result.json`` holds: ``config``, and ``config_given``, the keys that were set on purpose.
 
     Raises
     ------
     ConfigError
         Naming a key that there is not any more, or its value.
     """
-    kept = {key: value for key, value in values.items() if key not in RETIRED}
-    return _resolved([Layer("the configuration of the result", dotted(kept))], [])
+    config = _resolved([Layer("the configuration of the result", _recorded(record["config"]))], [])
+    config.given = _given_of(record)
+    return config
+
+
+def _recorded(values: Mapping[str, Any]) -> Any:
+    """The configuration of a result as a node."""
+    return dotted({key: value for key, value in values.items() if key not in RETIRED})
+
+
+def _given_of(record: Mapping[str, Any]) -> frozenset[str]:
+    """The keys that were set on purpose when a result was made; earlier versions did not say."""
+    given = record.get("config_given")
+    return frozenset(map(str, given)) if isinstance(given, list) else frozenset()
 
 
 def _resolved(layers: list[Layer], own: list[Layer]) -> Config:

@@ -196,6 +196,7 @@ _OTHERS: dict[str, Test] = {
     "mitigation": _maybe(_all_of({**_HIT, "full_braking": _maybe(_all_of(_HIT))}, {"proven": _maybe(_text)})),
     "limits": _table_of(_maybe(_number)),
     "versions": lambda value: isinstance(value, dict),
+    "config_given": _list_of(_text),
 }
 
 

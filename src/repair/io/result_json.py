@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,10 @@ from repair.io.drawing_json import drawing_from, drawing_to_dict
 from repair.io.record_check import Damage, require_record
 from repair.outcome.data import Outcome
 
-__all__ = ["DRAWING_FILE", "RESULT_FILE", "drawing_bytes", "load_result", "read_record", "to_json"]
+__all__ = [
+    "DRAWING_FILE", "RESULT_FILE", "drawing_bytes", "load_result", "read_record", "record_in", "scenario_of",
+    "to_json",
+]  # fmt: skip
 
 RESULT_FILE, DRAWING_FILE = "result.json", "drawing.json"
 
@@ -55,6 +60,17 @@ def read_record(folder: Path) -> dict[str, Any]:
             raise RepairError(f"{folder} holds no {RESULT_FILE}")
     except OSError as error:
         raise RepairError(f"{file} cannot be read: {error.strerror or error}") from error
+    return record_in(file)
+
+
+def record_in(file: Path) -> dict[str, Any]:
+    """What a file holds that ``repair run --out`` or ``--json`` wrote.
+
+    Raises
+    ------
+    RepairError
+        As :func:`read_record`.
+    """
     content = _read(file)
     if (
         not isinstance(content, dict)
@@ -67,6 +83,27 @@ def read_record(folder: Path) -> dict[str, Any]:
     except Damage as error:
         raise RepairError(f"{file} is damaged: {error}") from error
     return content
+
+
+def scenario_of(folder: Path, content: Mapping[str, Any]) -> Path:
+    """The file of the scenario that a result was made from: the one beside it, or where it came from.
+
+    Raises
+    ------
+    RepairError
+        If it is not there any more, or is another one by its checksum.
+    """
+    origin = content.get("provenance") or {}
+    beside = content.get("scenario_file")
+    path = folder / beside if beside else Path(str(origin.get("path") or ""))
+    if not path.is_file():
+        raise RepairError(f"the scenario {path} of the result is not there any more")
+    wanted = origin.get("sha256") or content.get("scenario_sha256")
+    if not wanted:
+        raise RepairError(f"{folder} does not say by its checksum which scenario it was made from")
+    if hashlib.sha256(path.read_bytes()).hexdigest() != wanted:
+        raise RepairError(f"the scenario {path} is not the one the result was made from (checksum)")
+    return path
 
 
 def _read(file: Path) -> Any:

@@ -148,6 +148,7 @@ def record_of(
         "drawing_file": None,
         "time_s": {name: number(seconds, 6) for name, seconds in phases.items()},
         "config": prepared.config.to_dict(),
+        "config_given": sorted(prepared.config.given),
         "versions": {"python": platform.python_version(), **{name: _version(name) for name in _PACKAGES}},
     }
 

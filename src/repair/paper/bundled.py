@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from repair.errors import ScenarioError, in_words
 
-__all__ = ["OFFICIAL_FILES", "PAPER_SCENARIOS", "find_scenario", "paper_scenario"]
+__all__ = ["OFFICIAL_FILES", "PAPER_SCENARIOS", "find_scenario", "paper_scenario", "reconstruction_by"]
 
 #: The paper's scenarios; each has a preset of the same name.
 PAPER_SCENARIOS = ("scenario_1", "scenario_2")
@@ -59,6 +60,25 @@ def paper_scenario(name: str) -> Iterator[Path]:
         return
     with _reconstruction(name) as written:
         yield written
+
+
+@contextmanager
+def reconstruction_by(checksum: str | None) -> Iterator[Path]:
+    """The reconstruction that a result was made from, generated again.
+
+    Raises
+    ------
+    ScenarioError
+        If none that this version generates has that SHA-256.
+    """
+    for name in PAPER_SCENARIOS:
+        with _reconstruction(name) as path:
+            if hashlib.sha256(path.read_bytes()).hexdigest() == checksum:
+                yield path
+                return
+    raise ScenarioError(
+        "the result was made from a reconstruction that this version does not generate any more"
+    )
 
 
 @contextmanager

@@ -118,7 +118,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
         return _of_curve(thing, scene)
     if hasattr(thing, "state_list"):
         return _of_trajectory(thing, scene)
-    table = table_of(thing)
+    table = _rounded(table_of(thing))  # as result.json has it: who runs that again follows the same
     require_times(table[:, 0], scene.dt)
     fine = _recording(table, scene, "by its own samples, ")
     _require_one_drive(fine, table[:, 0], scene.vehicle)
@@ -160,7 +160,7 @@ def given_start(thing: Any, scene: Scene) -> InitialState:
             [np.arange(len(made.positions)) * scene.dt, made.positions, made.headings, made.speeds]
         )
     else:
-        table = table_of(thing)
+        table = _rounded(table_of(thing))  # as result.json has it: who runs that again follows the same
     require_times(table[:, 0], scene.dt)
     (_, x, y, yaw, v), after = table[0], table[1]
     moved = np.array([after[1] - x, after[2] - y])
@@ -238,12 +238,20 @@ def _of_trajectory(trajectory: Any, scene: Scene) -> GivenReference:
     """A CommonRoad trajectory: its states are looked at as those of a solution file are."""
     with foreign("reading the given trajectory", ReferenceTrajectoryError):
         made = states_of(list(trajectory.state_list), WHAT, scene.initial_time_step, scene.vehicle)
-        made = replace(made, velocities=None)  # result.json, which is read again, has columns t to v
+        made = replace(  # result.json, which is read again, has columns t to v, of so many digits
+            made, velocities=None, positions=_rounded(made.positions),
+            headings=_rounded(made.headings), speeds=_rounded(made.speeds),
+        )  # fmt: skip
     _require_start(made, scene)
     require_consistent(made, scene.dt, scene.vehicle)
     table = [np.arange(len(made.positions)) * scene.dt, *made.positions.T, made.headings, made.speeds]
     plain = {k: column(v, 12) for k, v in zip(KEYS, table, strict=True) if np.isfinite(v).all()}
     return GivenReference(made, None, plain)
+
+
+def _rounded(values: Array) -> Array:
+    """Values with the digits that ``result.json`` has of them."""
+    return np.array(column(np.ravel(values), 12), dtype=np.float64).reshape(np.shape(values))
 
 
 def _of_curve(curve: Curve, scene: Scene) -> GivenReference:
