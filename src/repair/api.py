@@ -145,7 +145,7 @@ class RepairResult:
         )  # fmt: skip
 
     def to_dynamic_obstacle(self, obstacle_id: int | None = None) -> Any:
-        """The ego as a ``commonroad.scenario.obstacle.DynamicObstacle``, to add to a scenario."""
+        """The ego as a ``commonroad.scenario.obstacle.DynamicObstacle`` (``obstacle_id``, or a free id)."""
         return to_dynamic_obstacle(self.prepared.scene, self.states, obstacle_id)
 
     def to_solution(self) -> Any:
@@ -157,7 +157,7 @@ class RepairResult:
         return self.outcome.record
 
     def saved(self, folder: str | Path, *, figure: bool | FigureStyle = True) -> tuple[Outcome, list[Path]]:
-        """Write the result into a folder; its outcome with the names of the files, and their paths."""
+        """As :meth:`save` (``folder``, ``figure``): the outcome with the files' names, and their paths."""
         target = path_of(folder, "the folder of a result", OutputError)
         require_folder(target)
         outcome, scene = self.outcome, self.prepared.scene
@@ -165,7 +165,7 @@ class RepairResult:
         return saved(made, target)
 
     def save(self, folder: str | Path, *, figure: bool | FigureStyle = True) -> list[Path]:
-        """Write ``result.json``, solution file, figures (``figure``: whether, and how) and what they show.
+        """Write ``result.json``, solution file, figures (``figure``: whether, and how) into ``folder``.
 
         Raises
         ------
@@ -194,27 +194,27 @@ def repair(
         A loaded scene, or a CommonRoad XML file.
     config : Config, optional
         See :func:`repair.load_config`; defaults otherwise.
-    on_probe : callable, optional
-        Called after every probe (anytime use).
-    on_found, on_explaining : callable, optional
-        Called when the search has ended, before anything is made of it: from then on an interrupt is the
-        caller's; and with what an explanation looks at next, in words.
+    on_probe, on_found, on_explaining : callable, optional
+        Called after every probe (anytime use); when the search has ended, before anything is made of it: from
+        then on an interrupt is the caller's; and with what an explanation looks at next, in words.
     reference : optional
-        What is followed, from memory, instead of what ``reference.source`` names: an array (N, 3..5) with the
-        columns ``t [s], x [m], y [m][, yaw [rad][, v [m/s]]]``, a mapping with these names, a CommonRoad
-        trajectory, a curve in the scene's frame, or an earlier result; see
-        :func:`repair.reference.given.given_reference`. Or ``"constant"`` and the like, or a solution file.
+        What is followed, from memory: an array (N, 3..5) with the columns ``t [s], x [m], y [m][, yaw [rad][,
+        v [m/s]]]``, a mapping with these names, a CommonRoad trajectory, a curve in the scene's frame, or an
+        earlier result (:func:`repair.reference.given.given_reference`); or the name of a source or a file.
     traffic : iterable, optional
-        All other traffic there is, from memory, instead of the scenario's: CommonRoad obstacles and
-        :class:`repair.Prediction`; see :func:`repair.with_traffic`.
+        All other traffic there is, from memory, instead of the scenario's; see :func:`repair.with_traffic`.
     **keys
         Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
+
+    Returns
+    -------
+    RepairResult
+        Its F-TTR is that of Algorithm 1 (Tong et al., ITSC 2024): the latest *tested* time that passed.
 
     Raises
     ------
     RepairError
-        If the input cannot be used; its sentence says why. A scene that was loaded with other settings
-        than the configuration asks for is such input.
+        If the input cannot be used; its sentence says why. So is a scene that was loaded with other settings.
     """
     if config is not None and keys:
         raise RepairError("give either a config or configuration keys, not both")

@@ -119,6 +119,10 @@ def prepare(scene: Scene, config: Config, reference: Any = None) -> Prepared:
         A reference from memory, instead of what ``reference.source`` names; see
         :func:`repair.reference.given.given_reference`. A text is the name of a source, or a file.
 
+    Returns
+    -------
+    Prepared
+
     Raises
     ------
     RepairError

@@ -202,6 +202,12 @@ FORMATS: Registry[Format] = Registry(
 def register(name: str, written: Format) -> None:
     """Add an output format of your own for this process; every result that is saved then has its files.
 
+    Parameters
+    ----------
+    name : str
+    written : callable
+        A function of a result to files: :class:`Files`.
+
     Raises
     ------
     OutputError

@@ -100,7 +100,7 @@ class Situation:
         )  # fmt: skip
 
     def judged_at(self, t_rep: float) -> RepairProblem:
-        """The problem at a t_rep that a curve is judged by, without the boxes that nobody would look at."""
+        """The problem at ``t_rep`` [s] that judges a curve, without the boxes that nobody would look at."""
         config = self.checker.config
         if config.margin or config.extra or config.terminal == "require":
             return self.source.plain(t_rep)
@@ -150,6 +150,10 @@ class Situation:
             The repair.
         t_rep : float
             From when on it is driven [s].
+
+        Returns
+        -------
+        Onward or None
         """
         driven = self.reference if found is None else SplicedCurve(self.reference, found, t_rep)
         t_end = self.t_reference if found is None else self.t_end
@@ -162,7 +166,7 @@ class Situation:
         return None
 
     def ending(self, repaired: Curve, t_rep: float) -> Terminal | None:
-        """How a repair ends; None with ``checker.terminal: off``."""
+        """How the repair ``repaired`` from ``t_rep`` [s] on ends; None with ``checker.terminal: off``."""
         if self.checker.config.terminal == "off":
             return None
         return self.ends(SplicedCurve(self.reference, repaired, t_rep), self.t_end)

@@ -23,7 +23,23 @@ __all__ = [
 
 
 class SolveStatus(str, Enum):
-    """How a solve ended; ``.sentence`` says it for people."""
+    """How a solve ended; ``.sentence`` says it for people.
+
+    Attributes
+    ----------
+    SOLVED
+        The solver converged.
+    INFEASIBLE
+        The problem has no solution.
+    NO_CORRIDOR
+        No convex driving corridor connects the start to the horizon.
+    ITERATION_LIMIT, TIME_LIMIT
+        It came before convergence.
+    NUMERICAL_ERROR
+        The solver failed numerically.
+    UNAVAILABLE
+        The solver is not installed.
+    """
 
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
@@ -122,7 +138,7 @@ class SolveResult:
         The repaired part over [t_rep, t_end]. Present whenever the solver left something usable,
         also with ``iteration_limit``.
     objective : float
-        Final objective (nan where there is none).
+        Final objective, a number without unit (nan where there is none).
     iterations : int
     build_time, solve_time : float
         Wall time [s].
@@ -181,6 +197,11 @@ class RepairBackend(Protocol):
             verified there, as another backend's: ``closest`` may then be what comes nearest to it.
         time_limit : float, optional
             [s].
+
+        Returns
+        -------
+        SolveResult
+            A curve, or why there is none. Whether it can be driven is for the checker to say.
         """
         ...
 

@@ -75,7 +75,7 @@ class Bound:
     nodes : int
         Of all attempts.
     seconds : float
-        Processor time.
+        Processor time [s].
     proof : Proof or None
     """
 

@@ -47,6 +47,12 @@ CHECKS: Registry[Check] = Registry("check", {}, error=ConfigError, group="repair
 def register(name: str, check: Check) -> None:
     """Add a check of your own for this process; ``checker.extra: [name]`` asks for it.
 
+    Parameters
+    ----------
+    name : str
+    check : callable
+        A function of a driven trajectory to what is wrong with it: :data:`Check`.
+
     Raises
     ------
     ConfigError

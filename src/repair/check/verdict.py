@@ -13,7 +13,29 @@ __all__ = ["Conflict", "Reason", "Verdict", "Violation", "met"]
 
 
 class Reason(str, Enum):
-    """Why a trajectory is not feasible."""
+    """Why a trajectory is not feasible.
+
+    Attributes
+    ----------
+    COLLISION
+        An obstacle's true shape comes closer than ``checker.clearance``.
+    OFF_ROAD
+        The ego's rectangle leaves the road.
+    KINEMATICS
+        The kinematic single-track model cannot follow from one step to the next.
+    LIMITS
+        A limit of speed or acceleration is broken.
+    MARGIN
+        An inflated box is entered, where that is asked for (``checker.margin``).
+    CHECKER_ERROR
+        CommonRoad's own check failed on it.
+    NOT_SOLVED, NO_CORRIDOR, NO_PASSAGE
+        There is no trajectory: the solver gave none, no corridor leads on, no way past the obstacles is open.
+    UNSAFE_END
+        No stop follows its end (``checker.terminal: require``).
+    EXTRA
+        A registered check refuses it; the particulars say which.
+    """
 
     COLLISION = "collision"
     OFF_ROAD = "off_road"
@@ -25,7 +47,7 @@ class Reason(str, Enum):
     NO_CORRIDOR = "no_corridor"
     NO_PASSAGE = "no_passage"
     UNSAFE_END = "unsafe_end"
-    EXTRA = "extra"  # of a registered check; the particulars say which
+    EXTRA = "extra"
 
 
 @dataclass(frozen=True)
@@ -41,7 +63,13 @@ class Violation:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The checker's answer."""
+    """The checker's answer.
+
+    Attributes
+    ----------
+    violations : tuple of Violation
+        What is wrong, in the order of checking; empty where it is feasible.
+    """
 
     violations: tuple[Violation, ...] = ()
 

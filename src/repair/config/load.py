@@ -60,6 +60,10 @@ def load_config(
     **named
         Top-level keys (``backend="casadi"``).
 
+    Returns
+    -------
+    Config
+
     Raises
     ------
     ConfigError

@@ -33,7 +33,10 @@ _REGISTRIES: Mapping[str, Registry[Any]] = {r.kind: r for r in (BACKENDS, CHECKS
 
 @dataclass
 class Config:
-    """Everything that can be set; every registered backend has a section of its own beside these."""
+    """Everything that can be set; every registered backend has a section of its own beside these.
+
+    ``repair config --table`` lists each key with its default, range and meaning, those of the sections too.
+    """
 
     scenario: str | None = setting(None, "what `repair run` takes where none is named")
     driver: str = setting(
@@ -70,7 +73,7 @@ class Config:
     given = frozenset[str]()
 
     def section(self, name: str) -> Any:
-        """The section of a backend; its defaults where the configuration was made without it.
+        """The section of the backend ``name``; its defaults where the configuration was made without it.
 
         Raises
         ------

@@ -36,7 +36,7 @@ class FrenetTrajectory:
         return len(self.t)
 
     def window(self, start: float, end: float) -> FrenetTrajectory:
-        """The samples with ``start - 1e-9 <= t <= end + 1e-9``."""
+        """The samples from ``start`` to ``end`` [s], both included to 1e-9 s."""
         keep = (self.t >= start - INSTANT) & (self.t <= end + INSTANT)
         return FrenetTrajectory(
             self.t[keep], self.position[keep], self.velocity[keep],

@@ -1,4 +1,8 @@
-"""Bases of uniform B-splines as matrices: values, derivatives, Bernstein points."""
+"""Bases of uniform B-splines as matrices: values, derivatives, Bernstein points.
+
+Source: de Boor, *A Practical Guide to Splines*, 1978; the matrix form is that of Qin, *General matrix
+representations for B-splines*, 2000.
+"""
 
 from __future__ import annotations
 

@@ -115,26 +115,26 @@ class UniformBSpline:
         return self.t_start + greville_offsets(len(self.points), self.degree, self.spacing)
 
     def derivative_points(self, order: int) -> Array:
-        """Control points (n - order, 2) of the derivative curve; their hull bounds it."""
+        """Control points (n - order, 2) of the derivative of that ``order`` [m/s^order]; a hull of it."""
         return np.diff(self.points, n=order, axis=0) / self.spacing**order
 
     def segments(self) -> Array:
-        """Control points of each segment, (n - p, p + 1, 2)."""
+        """Control points of each segment, (n - p, p + 1, 2) [m]."""
         windows = np.lib.stride_tricks.sliding_window_view(self.points, self.degree + 1, axis=0)
         return np.asarray(np.swapaxes(windows, 1, 2))
 
     def bernstein_segments(self) -> Array:
-        """Bernstein control points of each segment, (n - p, p + 1, 2)."""
+        """Bernstein control points of each segment, (n - p, p + 1, 2) [m]."""
         return np.asarray(np.einsum("ij,kjd->kid", bernstein_matrix(self.degree), self.segments()))
 
     def speed_hulls(self, cuts: int = 1) -> tuple[Array, Array, Array]:
-        """Bounds of s' over parts of the curve (see :class:`repair.curves.base.Hulled`)."""
+        """Bounds of s' over ``cuts`` parts of each segment (see :class:`repair.curves.base.Hulled`)."""
         windows = self.points[:, 0].take(_segment_places(len(self.points), self.degree))
         points = windows @ bernstein_matrix(self.degree).T
         return speed_hulls(points, self.t_start, self.spacing, cuts)
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
-        """Evaluate position and three derivatives; beyond the span the end speed is held."""
+        """Position and three derivatives at the times ``t`` [s]; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
         made = sampling_at if len(times) <= KEPT else sampling_at.__wrapped__

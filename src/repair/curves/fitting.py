@@ -1,4 +1,7 @@
-"""B-splines that begin in a given state, and that come near to other curves."""
+"""B-splines that begin in a given state, and that come near to other curves.
+
+Source: de Boor, *A Practical Guide to Splines*, 1978, for least squares by splines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Bounds of a piecewise polynomial's speed, by the hulls of Bernstein points."""
+"""Bounds of a piecewise polynomial's speed, by the hulls of Bernstein points.
+
+Source: Farin, *Curves and Surfaces for CAGD*, 5th edition 2002: convex-hull property, and
+subdivision of Bernstein polynomials.
+"""
 
 from __future__ import annotations
 

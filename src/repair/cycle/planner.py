@@ -58,7 +58,7 @@ class RepairingPlanner(TrajectoryPlannerInterface):  # type: ignore[misc]  # com
         sc : commonroad.scenario.scenario.Scenario
         pp : commonroad.planning.planning_problem.PlanningProblem
         ref_path : (M, 2) array, optional
-            Handed on.
+            A path [m], handed on.
 
         Returns
         -------

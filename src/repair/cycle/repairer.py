@@ -142,9 +142,10 @@ class Repairer:
 
         Parameters
         ----------
-        reference : array, mapping, trajectory or result
-            The plan from ``now`` on, its times beginning with 0; see
-            :func:`repair.reference.given.given_reference`. Curves are not taken, as the frame may change.
+        reference : (N, 3) to (N, 5) array, mapping, trajectory or result
+            The plan (``t`` [s], ``x, y`` [m], ``yaw`` [rad], ``v`` [m/s]) from ``now`` on, its times
+            beginning with 0; see :func:`repair.reference.given.given_reference`. Curves are not taken, as
+            the frame may change.
         traffic : iterable, optional
             All others, from ``now`` on: CommonRoad obstacles (their time steps being those of the scenario),
             or :class:`repair.Prediction`. By default the scenario's own traffic.
@@ -154,8 +155,8 @@ class Repairer:
         now : float
             [s] since the planning problem's start; a multiple of the scenario's step.
         deadline : float, optional
-            The answer is there within so many seconds from the call on: the best that was verified by then,
-            in this cycle or an earlier one.
+            The answer is there within so many seconds [s] from the call on: the best that was verified by
+            then, in this cycle or an earlier one.
 
         Returns
         -------

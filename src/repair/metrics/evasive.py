@@ -1,4 +1,8 @@
-"""TTB, TTK, TTS and TTR: the latest start of full braking, kick-down, steering, and of any of them."""
+"""TTB, TTK, TTS and TTR: the latest start of full braking, kick-down, steering, and of any of them.
+
+Source: Hillenbrand, Spieker and Kroschel, *A multilevel collision mitigation approach*, T-ITS 2006; the TTR
+is Definition 1 of the paper (Tong et al. 2024).
+"""
 
 from __future__ import annotations
 

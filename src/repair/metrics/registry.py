@@ -26,6 +26,12 @@ METRICS: Registry[Metric | str] = Registry(
 def register(name: str, metric: Metric) -> None:
     """Add a metric of your own for this process; ``metrics: [name]`` asks for it.
 
+    Parameters
+    ----------
+    name : str
+    metric : callable
+        A function of what is asked about to a value and a word on it: :data:`Metric`.
+
     Raises
     ------
     ConfigError

@@ -100,6 +100,11 @@ def mitigate(situation: Situation, settings: MitigationConfig | None = None) -> 
     settings : MitigationConfig, optional
         Those of the configuration by default.
 
+    Returns
+    -------
+    Mitigation
+        The best motion, full braking beside it, and whether the look came to its end.
+
     Raises
     ------
     RepairError

@@ -22,7 +22,17 @@ __all__ = ["SIDE_AXIS", "SIDE_SIGN", "Afterwards", "Maneuver", "Passing", "Repai
 
 
 class Maneuver(str, Enum):
-    """What a repaired trajectory does about the conflict, named as people would."""
+    """What a repaired trajectory does about the conflict, named as people would.
+
+    Attributes
+    ----------
+    YIELD
+        It stays behind who is in the way.
+    GO_AHEAD
+        It passes first.
+    LEFT, RIGHT
+        It goes around, on that side.
+    """
 
     # That of Enum hashes the member's name, in Python, and differs from that of the equal string.
     __hash__ = str.__hash__
@@ -166,6 +176,10 @@ class RepairProblem:
             By which the road is narrowed on both sides [m].
         unused : float
             Share of every acceleration limit that is left unused.
+
+        Returns
+        -------
+        RepairProblem
         """
         return replace(
             self,

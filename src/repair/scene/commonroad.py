@@ -137,6 +137,19 @@ def scene_from_scenario(
 ) -> Scene:
     """Make a scene of a CommonRoad scenario and planning problem in memory; see :func:`load_scene`.
 
+    Parameters
+    ----------
+    scenario : commonroad.scenario.scenario.Scenario
+    planning_problem : commonroad.planning.planning_problem.PlanningProblem
+    config : Config or SceneConfig, optional
+        How it is read (the section ``scene``).
+    vehicle, horizon, after_prediction, smoothing
+        Single keys of that section, laid over it.
+
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     ScenarioError
@@ -164,7 +177,7 @@ def with_traffic(scene: Scene, traffic: Iterable[Any], *, threshold: float = 0.0
         Several predictions with one id are modes of that obstacle: a repair has to be clear of all of them.
         :func:`repair.predictions_of` makes predictions of arrays.
     threshold : float
-        Modes less probable than this are left out, with a note.
+        Modes less probable than this number are left out, with a note.
 
     Returns
     -------

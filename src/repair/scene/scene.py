@@ -136,7 +136,7 @@ class Scene:
     first_heading: float | None = None
 
     def ending_at(self, place: tuple[float, float]) -> str:
-        """What the road's end is, as it goes on a sentence about a place [m]; empty elsewhere."""
+        """What the road's end is, as it goes on a sentence about a ``place`` [m]; empty elsewhere."""
         end = self.road_end
         if end is None or np.hypot(place[0] - end.place[0], place[1] - end.place[1]) > _AT_THE_END:
             return ""

@@ -22,6 +22,7 @@ class ModeResult:
     name : str
         Of the mode.
     probability : float
+        A number from 0 to 1.
     stands_as : int
         The id under which it is among the traffic.
     status : str

@@ -16,11 +16,31 @@ __all__ = ["Probe", "SearchResult", "SearchStatus"]
 
 @dataclass(frozen=True)
 class Probe:
-    """One visited t_rep: what was solved, with which margin to the boxes [m], and what the checker said.
+    """One visited t_rep: what was solved, and what the checker said.
 
-    Where several backends are asked, ``by`` is the one that was, and ``fallback`` whether it was asked
-    because the search had ended without a repair; ``jump`` is by how much the acceleration was made to
-    differ from that of the reference where the repair begins [m/s²].
+    Attributes
+    ----------
+    t_rep : float
+        The time-to-repair [s].
+    solve : SolveResult
+        The backend's answer.
+    verdict : Verdict
+        The checker's.
+    maneuver : Maneuver or None
+        How the conflict is passed, where there is a curve.
+    check_time : float
+        Wall time of all checks [s].
+    tried : tuple of str
+        The manoeuvres that were tried, in words.
+    margin : float or None
+        Margin to the boxes that was asked for [m].
+    by : str
+        The backend that was asked, where there are several.
+    jump : float
+        By how much the acceleration was made to differ from that of the reference where the repair begins
+        [m/s²].
+    fallback : bool
+        Whether ``by`` was asked because the search had ended without a repair.
     """
 
     t_rep: float
@@ -41,14 +61,31 @@ class Probe:
 
 
 class SearchStatus(str, Enum):
-    """How a search ended."""
+    """How a search ended; ``.sentence`` says it for people.
+
+    Attributes
+    ----------
+    FOUND
+        A repaired trajectory passed every check.
+    NO_CONFLICT
+        The reference can be followed to its end.
+    ALREADY_COLLIDING
+        The ego is in conflict at the very start.
+    NONE_FEASIBLE
+        No tested time-to-repair has a feasible repair.
+    BUDGET_EXHAUSTED
+        Time limit or interrupt came before anything feasible was found.
+    UNAVOIDABLE
+        Nothing was found, and it is proven that nothing can be. No search says so, a proof does
+        (:mod:`repair.mitigation.status`).
+    """
 
     FOUND = "found"
     NO_CONFLICT = "no_conflict"
     ALREADY_COLLIDING = "already_colliding"
     NONE_FEASIBLE = "none_feasible"
     BUDGET_EXHAUSTED = "budget_exhausted"
-    UNAVOIDABLE = "unavoidable"  # no search says so: a proof does (repair.mitigation.status)
+    UNAVOIDABLE = "unavoidable"
 
     @property
     def sentence(self) -> str:

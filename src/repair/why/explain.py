@@ -49,7 +49,7 @@ class Explanation:
     tests : int
         Situations that were looked at.
     seconds : float
-        Processor time.
+        Processor time [s].
     """
 
     t_rep: float

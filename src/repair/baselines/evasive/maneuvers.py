@@ -1,4 +1,7 @@
-"""The fixed evasive manoeuvres: full braking, kick-down, steering, as curves."""
+"""The fixed evasive manoeuvres: full braking, kick-down, steering, as curves.
+
+Source: Hillenbrand, Spieker and Kroschel, *A multilevel collision mitigation approach*, T-ITS 2006.
+"""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Prediction:
     kind : str
         CommonRoad obstacle type, such as ``car``.
     probability : float
-        Of this mode.
+        Of this mode, a number from 0 to 1.
     mode : str
         Its name.
     """
@@ -67,14 +67,19 @@ def predictions_of(
     Parameters
     ----------
     boxes : (N, T, 3) or (N, T, 5) array
-        ``x, y, yaw`` of the centres at the scenario's steps, and with five columns ``length, width`` too
-        (constant over time); NaN where an obstacle is not there.
+        ``x, y`` [m] and ``yaw`` [rad] of the centres at the scenario's steps, and with five columns ``length,
+        width`` [m] too (constant over time); NaN where an obstacle is not there.
     length, width : float or (N,) array
         [m], where the array has three columns.
     ids : sequence of int, optional
         1, 2, ... by default.
     kind : str
         CommonRoad obstacle type.
+
+    Returns
+    -------
+    list of Prediction
+        One for each obstacle, in the order of the array.
 
     Raises
     ------

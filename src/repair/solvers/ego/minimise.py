@@ -1,6 +1,9 @@
 """Minimisers of a :class:`repair.solvers.ego.spline_cost.SplineCost`: Newton steps, or L-BFGS.
 
 The cost is convex and has one minimum; which way leads there is a matter of speed.
+
+Source: Nocedal and Wright, *Numerical Optimization*, 2nd edition 2006, chapters 3 and 7; L-BFGS
+is the paper's.
 """
 
 from __future__ import annotations
