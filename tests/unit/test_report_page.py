@@ -248,6 +248,36 @@ def test_in_a_browser(stored, tmp_path):
     assert found["wide"] <= 0  # nothing hangs over at the width of a telephone
 
 
+_MANY = """<script>
+window.addEventListener("load", () => {
+  const shown = () => document.querySelectorAll("#rows tbody tr").length, told = [shown()];
+  document.getElementById("more").click();
+  told.push(shown());
+  const filter = document.getElementById("filter");
+  filter.value = "timeout";
+  filter.dispatchEvent(new Event("input"));
+  document.body.dataset.found = JSON.stringify([...told, shown(),
+    document.getElementById("count").textContent]);
+});
+</script></body>"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
+def test_very_many_rows_are_shown_by_and_by(tmp_path):
+    rows = [row | {"file": f"{k}-{row['file']}"} for k in range(50) for row in ROWS]
+    driven = tmp_path / "driven.html"
+    page = study_page(rows, [None] * len(rows), {}, {})
+    driven.write_text(page.replace("</body>", _MANY), encoding="utf-8")
+    argv = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu",
+            f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", driven.as_uri()]  # fmt: skip
+    done = subprocess.run(argv, capture_output=True, text=True, timeout=300, check=True)
+    told = re.search(r'data-found="(.*?)"', done.stdout)
+    assert told is not None
+    found = json.loads(told.group(1).replace("&quot;", '"'))
+    assert found == [100, 200, 50, "50 of 300 rows"]
+
+
 def test_a_study_without_results_has_a_table(stored, tmp_path):
     file = stored / "ZAM_Test-1_1_T-1.xml"
     study = replace(Study((file,)), references=("constant",), official=False, results=False)

@@ -11,6 +11,7 @@ from repair.io.result_json import load_result
 from repair.report.page.html import study_page
 from repair.report.page.one import result_page
 from repair.study.plan import package_version
+from repair.study.run import Progress
 from repair.study.store import Store
 from repair.study.task import unpacked
 
@@ -38,9 +39,12 @@ def page_of_study(folder: Path) -> str:
         files = {task["file"]: task["sha256"] for task in tasks}
 
         def wholes() -> Iterator[dict[str, Any] | None]:
+            shown = Progress(len(done))
             for task in done:
                 whole = store.whole(task["position"])
                 yield None if whole is None else unpacked(whole)
+                shown.row("")
+            shown.close()
 
         return study_page(rows, wholes(), told, files)
 

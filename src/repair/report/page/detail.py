@@ -139,4 +139,5 @@ def _columns(points: Array, most: int) -> list[list[float]]:
 
 
 def _plain(values: Sequence[float] | Array) -> list[float]:
-    return [round(float(v), 2) for v in values]
+    made: list[float] = (np.round(np.asarray(values, dtype=float), 2) + 0.0).tolist()
+    return made

@@ -9,9 +9,28 @@
   };
   const axis = (title, more) => Object.assign({ title: { text: title }, gridcolor: "#eee", zerolinecolor: "#ccc" }, more);
 
+  // What takes a while comes one after the other, so that the page can be read and used meanwhile.
+  const jobs = [];
+  const later = () => setTimeout(() => { if (jobs.length) { jobs.shift()(); later(); } }, 0);
+  const all = () => { while (jobs.length) jobs.shift()(); };
+  window.addEventListener("beforeprint", () => { all(); shownRows = Infinity; fill(); });
+
+  // A figure with as much room below it as its legend takes.
+  function drawn(id, traces, layout) {
+    const place = by(id), named = traces.filter((each) => each.showlegend !== false && each.name);
+    const longest = Math.max(...named.map((each) => each.name.length), 1);
+    const across = Math.max(Math.floor(place.clientWidth / (60 + 6.5 * longest)), 1);
+    const below = 50 + (layout.showlegend === false ? 0 : 19 * Math.ceil(named.length / across));
+    place.style.height = (place.closest(".full") ? 420 : 270) + below + "px";
+    const margin = Object.assign({}, base.margin, { b: below });
+    return Plotly.react(place, traces, Object.assign({}, base, layout, { margin: margin }), look);
+  }
+
   // -- of all rows ----------------------------------------------------------------------------------
-  for (const figure of data.figures) {
-    Plotly.newPlot(by("figure-" + figure.id), figure.data, Object.assign({}, base, figure.layout), look);
+  if (!document.body.classList.contains("one")) {
+    for (const figure of data.figures) {
+      jobs.push(() => drawn("figure-" + figure.id, figure.data, figure.layout));
+    }
   }
 
   const table = by("rows"), head = table.tHead, body = table.tBodies[0];
@@ -48,24 +67,33 @@
     line.append(cell);
   });
 
-  const lines = texts.map((row, k) => {
+  const step = 100; // rows at a time: a browser lays out ten thousand cells as slowly as all else together
+  let shownRows = step, chosenRow = -1;
+  const lines = new Map();
+  function lineOf(k) {
+    if (lines.has(k)) return lines.get(k);
     const made = document.createElement("tr");
-    for (const text of row) {
+    for (const text of texts[k]) {
       const cell = document.createElement("td");
       cell.textContent = text;
       made.append(cell);
     }
     made.addEventListener("click", () => choose(k, true));
+    made.classList.toggle("chosen", k === chosenRow);
+    lines.set(k, made);
     return made;
-  });
+  }
 
   function fill() {
     const words = by("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
     const kept = order.filter((k) => words.every((word) => found[k].includes(word)));
-    body.replaceChildren(...kept.map((k) => lines[k]));
+    body.replaceChildren(...kept.slice(0, shownRows).map(lineOf));
     by("count").textContent = kept.length + " of " + order.length + " rows";
+    by("more").hidden = kept.length <= shownRows;
+    by("more").textContent = "Show more: " + Math.min(step, kept.length - shownRows) + " of the other " + (kept.length - shownRows);
   }
-  by("filter").addEventListener("input", fill);
+  by("filter").addEventListener("input", () => { shownRows = step; fill(); });
+  by("more").addEventListener("click", () => { shownRows += step; fill(); });
   fill();
 
   // -- of one row -----------------------------------------------------------------------------------
@@ -79,6 +107,7 @@
 
   async function choose(k, scroll) {
     const turn = ++lastChosen;
+    chosenRow = k;
     lines.forEach((row, j) => row.classList.toggle("chosen", j === k));
     by("detail").hidden = false;
     by("detail-title").textContent = data.names[k];
@@ -203,8 +232,8 @@
     const labels = moments.map(([t, text], k) => ({ x: t, y: 1, yref: "paper", yanchor: "top", xanchor: k ? "right" : "left",
       text: text, showarrow: false, font: { size: 11, color: "#555" } }));
     const time = axis("t [s]");
-    const panel = (id, title, traces, more) => Plotly.react(by(id), traces, Object.assign({}, base,
-      { xaxis: time, yaxis: axis(title, more), shapes: shapes, annotations: labels }), look);
+    const panel = (id, title, traces, more) => drawn(id, traces,
+      { xaxis: time, yaxis: axis(title, more), shapes: shapes, annotations: labels });
 
     // Distance: the ego's own length, and the others without the margin.
     const half = one.length / 2, others = [];
@@ -248,13 +277,13 @@
     }
 
     const turn = Array.from({ length: 73 }, (_, k) => k * Math.PI / 36), radius = one.limits.a_total;
-    Plotly.react(by("plot-circle"), [
+    drawn("plot-circle", [
       { x: turn.map((w) => radius * Math.cos(w)), y: turn.map((w) => radius * Math.sin(w)), mode: "lines", name: "limit",
         line: { color: "#b00020", width: 1, dash: "dashdot" }, hoverinfo: "skip" },
       { x: reference.across, y: reference.a, mode: "lines", name: "reference", line: { color: "#555", dash: "dash", width: 1 } },
     ].concat(chosen ? [{ x: chosen.across, y: chosen.a, mode: "lines+markers", name: name, marker: { size: 4, color: colour },
-      line: { color: colour, width: 1.5 } }] : []), Object.assign({}, base, {
-      xaxis: axis("across [m/s²]"), yaxis: axis("along [m/s²]", { scaleanchor: "x" }) }), look);
+      line: { color: colour, width: 1.5 } }] : []), {
+      xaxis: axis("across [m/s²]"), yaxis: axis("along [m/s²]", { scaleanchor: "x" }) });
     birdseye(reference, chosen, after, name, colour);
   }
 
@@ -287,13 +316,14 @@
       "the ego, all at " + on.t[k].toFixed(1) + " s"));
     const from = begins(reference), kept = (column) => one.lines.flatMap((each) => each[column].filter((_, k) => each.t[k] >= from));
     const xs = kept("x"), ys = kept("y");
-    Plotly.react(by("plot-bird"), traces, Object.assign({}, base, {
+    drawn("plot-bird", traces, {
       xaxis: axis("x [m]", { range: [Math.min(...xs) - 8, Math.max(...xs) + 8] }),
-      yaxis: axis("y [m]", { range: [Math.min(...ys) - 8, Math.max(...ys) + 8], scaleanchor: "x" }) }), look);
+      yaxis: axis("y [m]", { range: [Math.min(...ys) - 8, Math.max(...ys) + 8], scaleanchor: "x" }) });
   }
 
   by("relative").addEventListener("change", () => { if (one) draw(); });
   by("slider").addEventListener("input", () => { if (one) draw(); });
   const first = data.details.findIndex((each) => each !== null);
-  if (first >= 0) choose(first, false);
+  if (first >= 0) jobs.push(() => choose(first, false));
+  later();
 })();
