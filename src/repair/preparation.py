@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -251,6 +252,7 @@ def laid_out(
             f"repair.horizon is {wanted:g} s, but the conflict is at {conflict.time:g} s: "
             "a repair has to reach beyond it"
         )
+    logging.getLogger(__name__).info("%s: conflict %s at %g s", scene.id, conflict.kind, conflict.time)
     t_end = min(wanted, t_reference)
     t_end = max(on_grid(t_end, scene.dt), min(scene.dt, t_reference))
     return Prepared(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "UsageError", "configuration_arguments", "figure_arguments", "figure_style", "no_arguments", "resolve",
+    "told",
 ]  # fmt: skip
 
 # For --help alone, which loads no registry; `repair config --table` lists what is registered too.
@@ -79,3 +80,16 @@ def figure_style(arguments: argparse.Namespace) -> FigureStyle | None:
 def no_arguments(parser: argparse.ArgumentParser) -> None:
     """Takes nothing."""
     del parser
+
+
+def told(verbose: int) -> None:
+    """Let the loggers of ``repair`` write to standard error: once what is done, twice each probe as well."""
+    if not verbose:
+        return
+    import logging
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    logger = logging.getLogger("repair")
+    logger.handlers = [handler]  # one, however often the command is run in this process
+    logger.setLevel(logging.DEBUG if verbose > 1 else logging.INFO)

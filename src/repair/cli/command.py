@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from repair.cli import info, paper, r157, run, scenarios, study, sweep, written
-from repair.cli.arguments import UsageError, no_arguments
+from repair.cli.arguments import UsageError, no_arguments, told
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
 
@@ -71,6 +71,7 @@ VERBS: tuple[Verb, ...] = (
     Verb("r157", "UN R157's cut-in, cut-out and deceleration cases", r157.r157_arguments, r157.r157),
     Verb("backends", "list the backends, and what is missing", no_arguments, info.backends),
     Verb("presets", "list the bundled presets", no_arguments, info.presets),
+    Verb("completion", "print what a shell needs to complete", info.completion_arguments, info.completion),
     Verb("config", "print the resolved configuration as YAML", info.config_arguments, info.config),
 )
 
@@ -85,6 +86,10 @@ def parser() -> argparse.ArgumentParser:
             verb.name, help=verb.help, description=verb.help[0].upper() + verb.help[1:] + "."
         )
         verb.arguments(own)
+        own.add_argument(
+            "-v", "--verbose", action="count", default=0,
+            help="say on standard error what is done; -vv: each time-to-repair that is tried",
+        )  # fmt: skip
         own.set_defaults(run=verb.run)
     return made
 
@@ -124,6 +129,8 @@ def _run(argv: Sequence[str] | None) -> int:
     if arguments.verb is None:
         known.print_help()
         return 0
+    arguments.parser = known
+    told(arguments.verbose)
     try:
         status: int = arguments.run(arguments)
     except UsageError as error:

@@ -1,14 +1,12 @@
-"""``repair backends``, ``presets``, ``config``."""
+"""``repair backends``, ``presets``, ``config``, ``completion``."""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from repair.cli.arguments import configuration_arguments, resolve
-
-if TYPE_CHECKING:
-    pass
+from repair.errors import RepairError
 
 
 def backends(_: argparse.Namespace) -> int:
@@ -48,4 +46,24 @@ def config(arguments: argparse.Namespace) -> int:
     import yaml
 
     print(yaml.safe_dump(resolve(arguments).to_dict(), sort_keys=False), end="")
+    return 0
+
+
+def completion_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair completion``."""
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"), help="whose script is printed")
+
+
+def completion(arguments: argparse.Namespace) -> int:
+    """The script that completes verbs, options and files; made by shtab from the parser itself."""
+    try:
+        import shtab
+    except ImportError as error:
+        raise RepairError("completion needs shtab: pip install 'commonroad-repair[completion]'") from error
+    known: argparse.ArgumentParser = arguments.parser
+    for verbs in (one for one in known._actions if isinstance(one, argparse._SubParsersAction)):
+        for action in (one for own in verbs.choices.values() for one in own._actions):
+            if action.type is Path or action.dest == "scenario":
+                action.complete = shtab.FILE
+    print(shtab.complete(known, arguments.shell))
     return 0

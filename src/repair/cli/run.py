@@ -44,7 +44,11 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="write result.json, the solution file and figures"
     )
-    parser.add_argument("--json", action="store_true", help="print what result.json holds, and nothing else")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--json", action="store_true", help="print what result.json holds, and nothing else")
+    how.add_argument(
+        "-q", "--quiet", action="store_true", help="print the answer alone: no table, times, notes"
+    )
     parser.add_argument(
         "--bound", action="store_true", help="prove from when on nothing avoids the conflict any more"
     )
@@ -176,7 +180,7 @@ def run(arguments: argparse.Namespace) -> int:
     with _Interrupts() as interrupts, _scenario(arguments) as (path, config, given):
         from repair.api import repair
         from repair.io.result_json import to_json
-        from repair.report.text import summary
+        from repair.report.text import answer, summary
 
         result = repair(path, config, on_found=interrupts.found, on_explaining=_progress(), reference=given)
         content, problem = result.to_dict(), None
@@ -193,6 +197,8 @@ def run(arguments: argparse.Namespace) -> int:
             interrupts.found()
         if arguments.json:
             sys.stdout.write(as_json(to_json(content)))
+        elif arguments.quiet:
+            print(answer(content, arguments.preset))
         else:
             print(summary(content, arguments.preset, written))
         if problem is not None:

@@ -12,7 +12,7 @@ from repair.report.rows.mitigation import mitigation_rows
 from repair.report.rows.why import why_rows
 from repair.report.timeline import timeline_rows
 
-__all__ = ["fixed", "headline", "probe_table", "summary"]
+__all__ = ["answer", "fixed", "headline", "probe_table", "summary"]
 
 _KINDS = {
     "margin": "the safety margin of obstacle {id} is entered",
@@ -44,7 +44,7 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
     written : sequence of Path
         Files that were written.
     """
-    lines = [f"{name:9} {text}" for name, text in headline(content, preset)]
+    lines = [answer(content, preset)]
     if content["probes"]:
         lines += ["", *probe_table(content["probes"])]
     lines += ["", f"Time      {_times(content['time_s'])}"]
@@ -58,6 +58,11 @@ def summary(content: dict[str, Any], preset: str | None, written: Sequence[Path]
             "Files     none written; --out DIR writes result.json, the solution file, figures and a page"
         )
     return "\n".join(lines)
+
+
+def answer(content: dict[str, Any], preset: str | None = None) -> str:
+    """The lines of :func:`headline` as text."""
+    return "\n".join(f"{name:9} {text}" for name, text in headline(content, preset))
 
 
 def headline(content: dict[str, Any], preset: str | None = None) -> list[tuple[str, str]]:

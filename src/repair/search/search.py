@@ -8,6 +8,7 @@ produce the iterates that the paper reports; rule ``as_printed`` visits what it 
 from __future__ import annotations
 
 import itertools
+import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -27,6 +28,7 @@ from repair.timegrid import INSTANT, ROUNDING, on_grid
 __all__ = ["iter_probes", "search_f_ttr"]
 
 
+_LOG = logging.getLogger(__name__)
 _HELP = 0.05  # [s] below which a helper is not asked: laying out its task alone may take as long
 
 
@@ -313,12 +315,18 @@ def search_f_ttr(
     try:
         for probe in iter_probes(source, backend, checker, end, settings, clock, visits, after, hopeless):
             probes.append(probe)
+            _LOG.debug(
+                "t_rep %g s: %s (%s)", probe.t_rep,
+                "feasible" if probe.feasible else "rejected, " + ", ".join(probe.verdict.reasons),
+                probe.solve.status.sentence,
+            )  # fmt: skip
             if on_probe is not None:
                 on_probe(probe)
     except (OutOfTime, KeyboardInterrupt):
         complete = False
     feasible = [p for p in probes if p.feasible]
     wall = clock() - begin
+    _LOG.info("%d times-to-repair tried in %.3f s, %d feasible", len(probes), wall, len(feasible))
     if feasible:
         best = max(feasible, key=lambda p: p.t_rep)
         return SearchResult(
