@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,7 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
         keys = [k for k in overrides if name != "before" or not k.startswith("fallback")]
         others[name] = Rebuilding(sources, file, backend, keys)
     spent: list[float] = []
+    parts: dict[str, list[float]] = defaultdict(list)
     slow: dict[str, list[float]] = {name: [] for name in others}
     memory, every = [], max(cycles // max(rebuilds, 1), 1)
     gc.collect()
@@ -127,8 +129,10 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
             watch.reset()
         traffic = predictions(cycle.traffic)
         begin = time.process_time()
-        watch.update(cycle.plan, traffic=traffic, now=cycle.now)
+        answer = watch.update(cycle.plan, traffic=traffic, now=cycle.now)
         spent.append(time.process_time() - begin)
+        for name, seconds in {**answer.prepared.phases, "search": answer.search.wall_time}.items():
+            parts[name].append(seconds)
         if k % every == every // 2:
             for name, other in others.items():
                 slow[name].append(other(cycle.plan, cycle.traffic)[1])
@@ -145,6 +149,9 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
         f"({p999 / median:.1f} x the median), most {warm.max():.2f} ms; memory grew by "
         f"{memory[-1] - memory[0]:.1f} MB after the first tenth"
     ]
+    shares = {name: float(np.median(values)) for name, values in parts.items()}
+    whole = sum(shares.values())
+    lines.append("  " + ", ".join(f"{name} {v / whole:.0%}" for name, v in shares.items()))
     for name, values in slow.items():
         built = 1e3 * float(np.median(values[1:] or values))
         lines.append(

@@ -8,9 +8,8 @@ search
     the scan of that frame finds the later one: behind a time-to-repair that is not feasible, where a search
     that goes on from its last answer does not look;
 frame
-    it does not: the plan lies in a frame of its own there, and in that of an earlier cycle here;
-grid
-    the two differ by less than a step of the grid: a kept repair is not on it.
+    it does not: the plan lies in a frame of its own there, and in that of an earlier cycle here, so that the
+    spline and the boxes differ by centimetres.
 """
 
 from __future__ import annotations
@@ -97,11 +96,10 @@ def kind_of(own: Any, fresh: Any, watch: Any, scan: Any) -> str:
         return f"the same ({fresh.status.value})"
     if mine > other:
         return "later, kept" if own.kept else "later"
-    step = scan.search.delta_t
     whole = find(own.prepared, watch._backend, settings=scan.search)
     if whole.f_ttr is not None and whole.f_ttr > mine + 1e-9:
         return "earlier: search"
-    return "earlier: grid" if other - mine < step - 1e-9 and mine >= 0.0 else "earlier: frame"
+    return "earlier: frame"
 
 
 def main() -> int:

@@ -233,6 +233,9 @@ class Repairer:
                     prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
                     guess if guess is not None and guess >= 0.0 else None,
                 )  # fmt: skip
+                if found.probes:
+                    longest = max(probe.check_time for probe in found.probes)
+                    self._paces.setdefault("judging", Pace()).took(longest)
         except OutOfTime:
             pass
         return self._answer(prepared, found, kept, refuted, asked)
@@ -244,7 +247,10 @@ class Repairer:
         settings = self.config.search
         if asked.at is None:
             return settings
-        left = max(asked.at - time.perf_counter(), 1e-6)
+        # What is solved in time is judged after it, and that takes as long as it takes.
+        left = asked.at - time.perf_counter() - self._paces.setdefault("judging", Pace()).expected
+        if left <= 0.0:
+            raise OutOfTime
         return replace(settings, time_limit=min(left, settings.time_limit or left))
 
     def _step(self, now: float) -> int:
