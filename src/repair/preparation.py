@@ -55,6 +55,7 @@ _JUDGED = {Reason.KINEMATICS.value, Reason.LIMITS.value}
 # What is asked of something prepared, and changes nothing about it; nor do the sections of the backends.
 _ASKED_LATER = {
     "scenario", "driver", "backend", "fallback", "metrics", "search", "evasive", "bound", "for_backend",
+    "simulate",
 }  # fmt: skip
 
 
@@ -217,7 +218,7 @@ def laid_out(
         checker = Checker(scene, limits, sampled(config.checker, scene.dt), allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
-    within = partial(_part_in_reach, scene, config, limits, given) if within_reach else None
+    within = partial(_part_in_reach, scene, config, limits, given, reference) if within_reach else None
     whole = Boxes(partial(_boxes, scene, offsets, within))
     if not within_reach:
         with phases("occupancy"):
@@ -273,10 +274,12 @@ def laid_out(
 
 
 def _part_in_reach(
-    scene: Scene, config: Config, limits: Limits, given: GivenReference | None
+    scene: Scene, config: Config, limits: Limits, given: GivenReference | None, followed: Curve | None
 ) -> Within | None:
     """The part of the road where the ego may be; None where nobody knows."""
     places = None if given is None else given.positions
+    if followed is not None:
+        places = scene.frame.to_cartesian(*followed.sample(scene.times).position.T)
     return None if places is None else part_in_reach(scene, config.repair, limits, places)
 
 

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from repair.cli import info, paper, r157, run, scenarios, study, sweep, written
 from repair.cli.arguments import UsageError, no_arguments, told
+from repair.cli.loop import simulate
 from repair.cli.streams import lenient, opened
 from repair.errors import RepairError, in_words
 
@@ -58,6 +59,12 @@ VERBS: tuple[Verb, ...] = (
     ),
     Verb("study", "repair many scenarios as a file says, resumable", study.study_arguments, study.study),
     Verb("report", "one page of HTML about a study or a result", written.report_arguments, written.report),
+    Verb(
+        "simulate",
+        "drive among recorded traffic, and see when to leave the plan",
+        simulate.simulate_arguments,
+        simulate.simulate,
+    ),
     Verb("sweep", "repair all scenarios of a folder", sweep.sweep_arguments, sweep.sweep),
     Verb("table1", "the paper's Table I, paper and ours", paper.table1_arguments, paper.table1),
     Verb("table2", "the paper's Table II, times on this machine", paper.table2_arguments, paper.table2),

@@ -11,6 +11,7 @@ from repair.baselines.evasive.settings import EvasiveConfig
 from repair.bounds.settings import BoundConfig
 from repair.check.registry import CHECKS
 from repair.check.settings import CheckerConfig
+from repair.config.simulate import SimulateConfig
 from repair.errors import BackendError, ConfigError, in_words
 from repair.metrics.registry import METRICS
 from repair.mitigation.settings import MitigationConfig
@@ -65,6 +66,7 @@ class Config:
     bound: BoundConfig = field(default_factory=BoundConfig)
     explain: ExplainConfig = field(default_factory=ExplainConfig)
     mitigation: MitigationConfig = field(default_factory=MitigationConfig)
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
     for_backend: dict[str, Any] = setting(
         factory=dict, says="keys that count where a backend is used, by its name"
     )
@@ -104,6 +106,8 @@ class Config:
                 yield key.name, "backend", self.backend
             if key.name in self.given and owner == "evasive" and not self.metrics and self.driver == "f_ttr":
                 yield key.name, "metrics", "[]"
+            if key.name in self.given and owner == "simulate":
+                yield key.name, "command", "run"
 
     def _asked(self) -> set[str]:
         """Names of all backends that may have a say."""

@@ -11,10 +11,19 @@ from pathlib import Path
 
 from repair.errors import ScenarioError, in_words
 
-__all__ = ["OFFICIAL_FILES", "PAPER_SCENARIOS", "find_scenario", "paper_scenario", "reconstruction_by"]
+__all__ = [
+    "GENERATED",
+    "OFFICIAL_FILES",
+    "PAPER_SCENARIOS",
+    "find_scenario",
+    "paper_scenario",
+    "reconstruction_by",
+]
 
 #: The paper's scenarios; each has a preset of the same name.
 PAPER_SCENARIOS = ("scenario_1", "scenario_2")
+#: All that are generated: theirs, and our variation of the first one.
+GENERATED = (*PAPER_SCENARIOS, "scenario_1_stops")
 #: Those that are published as CommonRoad files.
 OFFICIAL_FILES = {"scenario_1": "DEU_Flensburg-6_1_T-1.xml"}
 
@@ -27,7 +36,7 @@ def find_scenario(name: str) -> Iterator[Path]:
     ----------
     name : str
         A path; a file's name, with or without ``.xml``, in the folder COMMONROAD_SCENARIOS; or one of
-        :data:`PAPER_SCENARIOS`, which always gives the reconstruction.
+        :data:`GENERATED`, which always gives the reconstruction.
 
     Raises
     ------
@@ -42,7 +51,7 @@ def find_scenario(name: str) -> Iterator[Path]:
         existing = next((p for p in candidates if p.is_file()), None)
     except (OSError, ValueError) as error:  # a name that is too long, or cannot be spelt
         raise ScenarioError(f"{in_words(name)} is not the name of a file: {in_words(error)}") from error
-    if existing is None and name in PAPER_SCENARIOS:
+    if existing is None and name in GENERATED:
         with _reconstruction(name) as written:
             yield written
         return

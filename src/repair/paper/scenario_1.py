@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from repair.paper.roads import follow, lanelet_along, planning_problem, quarter_turn, scenario_of, turning
 
-__all__ = ["scenario_1"]
+__all__ = ["scenario_1", "scenario_1_stops"]
 
 # The ego starts at the origin, heading along +x. "Measured" means read off
 # DEU_Flensburg-6_1_T-1 as this one number; "fitted" means chosen such that car 36, projected on the
@@ -31,6 +32,8 @@ _CAR_END = 0.19  # y on the eastern lane at the end (0.1) [m]
 _CAR_TURN = (0.2, 3.08, 11.99)  # a short begin and a long end of the turn (0.15 1/m in its middle)
 # From standstill (2.1 m/s²), in the turn (1.0), out of it (2.1) and on (1.65), to 13.7 m/s (assumed)
 _CAR_PROFILE = ((1.4, 1.94), (0.8, 0.67), (2.0, 2.28), (3.7, 1.6))
+# The same beginning, then the car lets the ego pass: it brakes and stands before the ego's lane (ours).
+_CAR_STOPS = ((1.4, 1.94), (0.68, -4.0))
 
 
 def _junction() -> list[Any]:
@@ -69,6 +72,19 @@ def _junction() -> list[Any]:
     ]
 
 
+def scenario_1_stops() -> tuple[Any, Any]:
+    """Scenario 1 in which car 36 begins as there, and then stops instead of crossing: a variation of ours.
+
+    Who follows the plan of Scenario 1 touches nobody, and for who believes in constant speeds it looks
+    for a while as if.
+
+    Returns
+    -------
+    scenario, planning_problem_set
+    """
+    return _scenario("RepairTJunctionStops", _CAR_STOPS)
+
+
 def scenario_1() -> tuple[Any, Any]:
     """The urban T-intersection (Sec. V-B): a reconstruction of the conflict in DEU_Flensburg-6_1_T-1.
 
@@ -91,6 +107,11 @@ def scenario_1() -> tuple[Any, Any]:
     scenario, planning_problem_set
         CommonRoad objects; 10 s in steps of 0.1 s. The ego is on the exit lane at the end.
     """
+    return _scenario("RepairTJunction", _CAR_PROFILE)
+
+
+def _scenario(name: str, profile: Sequence[tuple[float, float]]) -> tuple[Any, Any]:
+    """With one or the other motion of car 36."""
     half = np.pi / 2.0
     crossing = turning(
         (_SOUTH, _CAR_START), -half, _CAR_START - _CAR_END, _EAST - _SOUTH, quarter_turn(*_CAR_TURN)
@@ -101,10 +122,10 @@ def scenario_1() -> tuple[Any, Any]:
     leader = (_NORTH, 16.3), half, [(40.0, 0.0, 0.0)]
     bus = (13.98, 0.0), 0.0, [(_EAST - 13.98, 0.0, 0.0)]
     obstacles = [
-        follow(36, "car", (4.75, 1.73), crossing, 0.0, _CAR_PROFILE),
+        follow(36, "car", (4.75, 1.73), crossing, 0.0, profile),
         follow(333, "car", (4.70, 1.69), leader, 7.0,
                 [(1.0, -2.65), (1.0, -2.0), (1.0, -1.35), (1.0, -0.6), (1.0, -0.4)]),
         follow(337, "bus", (12.14, 2.53), bus, 6.25, [(10.0, 0.7)]),
     ]  # fmt: skip
-    scenario = scenario_of("RepairTJunction", "urban", _junction(), obstacles)
+    scenario = scenario_of(name, "urban", _junction(), obstacles)
     return scenario, planning_problem(_EGO_SPEED, scenario.lanelet_network.find_lanelet_by_id(103))

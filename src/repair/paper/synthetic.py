@@ -18,14 +18,14 @@ from typing import Any
 
 from repair.errors import ConfigError, OutputError
 from repair.paper.roads import DATE
-from repair.paper.scenario_1 import scenario_1
+from repair.paper.scenario_1 import scenario_1, scenario_1_stops
 from repair.paper.scenario_2 import scenario_2
 
 __all__ = ["SCENARIOS", "write_scenario"]
 
 
 SCENARIOS: Mapping[str, Callable[[], tuple[Any, Any]]] = MappingProxyType(
-    {"scenario_1": scenario_1, "scenario_2": scenario_2}
+    {"scenario_1": scenario_1, "scenario_2": scenario_2, "scenario_1_stops": scenario_1_stops}
 )
 """Name to generator."""
 

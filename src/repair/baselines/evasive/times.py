@@ -23,7 +23,7 @@ from repair.world.occupancy import first_entry
 if TYPE_CHECKING:
     from repair.situation import Situation
 
-__all__ = ["EvasiveResult", "EvasiveStatus", "evasive_ttr"]
+__all__ = ["EvasiveResult", "EvasiveStatus", "brakes_free", "evasive_ttr"]
 
 
 class EvasiveStatus(str, Enum):
@@ -117,6 +117,19 @@ def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
     best = max(curves, key=lambda m: times[m], default=None)
     brake, kick, left, right = (times[m] for m in EvasiveManeuver)
     return EvasiveResult(brake, kick, left, right, max(times.values()), best, status, curves)
+
+
+def brakes_free(situation: Situation, settings: EvasiveConfig, t: float) -> bool:
+    """Whether full braking along the path from ``t`` on avoids every collision: whether TTB is not before.
+
+    Parameters
+    ----------
+    situation : Situation
+    settings : EvasiveConfig
+    t : float
+        [s].
+    """
+    return _escape(situation, settings, EvasiveManeuver.BRAKE, t) is not None
 
 
 def _uniform(status: EvasiveStatus) -> EvasiveResult:

@@ -9,7 +9,7 @@ import numpy as np
 
 from repair.arrays import Array
 
-__all__ = ["Obstacle", "later"]
+__all__ = ["Obstacle", "Traffic", "later"]
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,22 @@ class Obstacle:
     def n_steps(self) -> int:
         """Index of the last step; ``vertices`` has one row more."""
         return len(self.vertices) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Traffic:
+    """Everybody else, from now on.
+
+    Attributes
+    ----------
+    obstacles : tuple of Obstacle
+        Of ``n_steps + 1`` rows each.
+    n_steps : int
+        Until when something is known [steps].
+    """
+
+    obstacles: tuple[Obstacle, ...]
+    n_steps: int
 
 
 def later(obstacle: Obstacle, step: int) -> Obstacle | None:

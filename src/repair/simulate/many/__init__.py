@@ -1,0 +1,1 @@
+"""Many drives: files, plans, shifts, predictions and policies."""

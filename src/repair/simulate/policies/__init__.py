@@ -1,0 +1,1 @@
+"""When the ego leaves its plan, each a small class behind one interface."""

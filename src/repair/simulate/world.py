@@ -1,0 +1,139 @@
+"""The others: what they did, what was known of them at a step, and what is believed of their future."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from repair.arrays import Array
+from repair.scene.road.lanes import Lane
+from repair.scene.traffic.obstacle import Obstacle
+from repair.simulate.predictions.base import Known, Predictor, cut
+
+__all__ = ["Beliefs", "World", "widened"]
+
+_STATED = frozenset(
+    {"static", "environment", "phantom", "set_based"}
+)  # who does not move, or is a set of places
+_MOVES = 0.5  # who is believed to move by less is believed to stand [m]
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Recorded traffic, from a while after the record's beginning on. It does not react.
+
+    Attributes
+    ----------
+    obstacles : tuple of Obstacle
+        All rows of the record.
+    dt : float
+        [s].
+    n_steps : int
+        Steps of the drive.
+    shift : int
+        By how many steps the drive begins later than the record.
+    lanes : mapping
+        The lanelets, by id.
+    """
+
+    obstacles: tuple[Obstacle, ...]
+    dt: float
+    n_steps: int
+    shift: int = 0
+    lanes: Mapping[int, Lane] = field(default_factory=dict)
+
+    def since(self, step: int, until: int) -> list[Obstacle]:
+        """What truly happens from a step of the drive to another, both included."""
+        found = (cut(o, self.shift + step, self.shift + until) for o in self.obstacles)
+        return [o for o in found if np.isfinite(o.vertices).any()]
+
+
+@dataclass(eq=False)
+class Beliefs:
+    """What one prediction says, made once for each step of the record.
+
+    Attributes
+    ----------
+    world : World
+    predictor : Predictor
+    lookahead : int
+        [steps].
+    """
+
+    world: World
+    predictor: Predictor
+    lookahead: int
+    _made: dict[int, tuple[Obstacle, ...]] = field(default_factory=dict)
+
+    def ahead(self, step: int) -> int:
+        """How far is looked at a step of the drive [steps]: never beyond the record's end."""
+        return min(self.lookahead, self.world.n_steps - step)
+
+    def at(self, step: int) -> tuple[Obstacle, ...]:
+        """Everybody from a step of the drive on, over ``ahead(step) + 1`` rows."""
+        if step not in self._made:
+            found = (self._one(o, self.world.shift + step, self.ahead(step)) for o in self.world.obstacles)
+            self._made[step] = tuple(
+                o for o in found if o is not None and bool(np.isfinite(o.vertices).any())
+            )
+        return self._made[step]
+
+    def _one(self, record: Obstacle, now: int, n_steps: int) -> Obstacle | None:
+        if record.role in _STATED:
+            return cut(record, now, now + n_steps)
+        looks_ahead = getattr(self.predictor, "looks_ahead", False)
+        if not looks_ahead and not np.isfinite(record.vertices[now]).any():
+            return None
+        world = self.world
+        past = cut(record, 0, now)
+        known = Known(past, record if looks_ahead else past, now, world.dt, n_steps, world.lanes)
+        return self.predictor.predict(known)
+
+
+def widened(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple[Obstacle, ...]:
+    """Everybody, and everybody who moves ahead of and behind where he is believed to be.
+
+    Parameters
+    ----------
+    obstacles : tuple of Obstacle
+    error : float
+        The distance is half of it times t² [m/s²]; nobody is believed to back up.
+    dt : float
+        [s].
+    """
+    made = list(obstacles)
+    for one in obstacles if error > 0.0 else ():
+        places = one.states[:, :2]
+        if one.role in _STATED or not np.isfinite(places).all():
+            continue
+        arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
+        if arc[-1] < _MOVES:
+            continue
+        off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
+        behind = np.maximum.accumulate(np.maximum(arc - off, 0.0)) - arc
+        made += [_along(one, off), _along(one, behind)]
+    return tuple(made)
+
+
+def _along(one: Obstacle, by: Array) -> Obstacle:
+    """An obstacle shifted along its headings by distances (T,) [m]."""
+    heading = np.nan_to_num(one.states[:, 2])
+    shift = by[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+
+    def shifted(table: Array | None) -> Array | None:
+        if table is None:
+            return None
+        found = table.copy()
+        found[:, :2] += shift
+        return found
+
+    return replace(
+        one,
+        vertices=one.vertices + shift[:, None],
+        rectangles=shifted(one.rectangles),
+        circles=shifted(one.circles),
+        polygons=tuple(tuple(p + shift[k] for p in parts) for k, parts in enumerate(one.polygons)),
+        states=np.column_stack([one.states[:, :2] + shift, one.states[:, 2:]]),
+    )

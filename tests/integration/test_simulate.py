@@ -1,0 +1,157 @@
+"""Whole drives: Scenario 1, and its variation in which the crossing car stops; the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from shapely import affinity
+
+from repair.cli import main
+from repair.errors import ConfigError
+from repair.paper.synthetic import write_scenario
+from repair.scene.commonroad import load_scene
+from repair.scene.scene import InitialState
+from repair.scene.traffic.obstacle import Traffic
+from repair.simulate.many.case import Case, cases_of, plan_on, simulation_config
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory) -> dict[str, Case]:
+    """Both scenarios, as generated; cycles of 0.1 s."""
+    folder, made = tmp_path_factory.mktemp("loop"), {}
+    config = simulation_config(overrides=["reference.source=planner"])
+    for name in ("scenario_1", "scenario_1_stops"):
+        scene = load_scene(write_scenario(name, folder), config)
+        ((_, case),) = cases_of(plan_on(scene, config), config, (0.0,))
+        made[name] = case
+    return made
+
+
+def touched(case: Case, driven) -> list[int]:
+    """Whom the ego's rectangle meets at a step, by polygons of the test's own."""
+    vehicle, found = case.plan.scene.vehicle, []
+    box = shapely.box(-vehicle.half_length, -vehicle.half_width, vehicle.half_length, vehicle.half_width)
+    for k, (x, y, yaw) in enumerate(
+        zip(*(driven.states[name] for name in ("x", "y", "orientation")), strict=True)
+    ):
+        own = affinity.translate(affinity.rotate(box, yaw, origin=(0, 0), use_radians=True), x, y)
+        for one in case.world.obstacles:
+            corners = one.vertices[k]
+            if np.isfinite(corners).all() and own.intersects(shapely.Polygon(corners)):
+                found.append(one.id)
+    return found
+
+
+def test_a_car_that_stops_is_waited_for(cases):
+    case = cases["scenario_1_stops"]
+    assert case.never.struck is None
+    waits = case.drive("constant_velocity", "f_ttr")
+    assert any(cycle.ttc < 3.0 for cycle in waits.cycles)  # for a while it looks as if
+    assert {cycle.mode for cycle in waits.cycles} == {"plan"}
+    assert waits.states["x"] == pytest.approx(waits.states["plan_x"], abs=1e-6)
+    acts = case.drive("constant_velocity", "at_once")
+    assert "repair" in {cycle.mode for cycle in acts.cycles}
+    assert not touched(case, acts)
+
+
+def test_a_car_that_crosses_is_avoided_from_the_f_ttr_on(cases):
+    case = cases["scenario_1"]
+    assert case.never.struck.obstacle_id == 36
+    driven = case.drive("recorded", "f_ttr")
+    waited = [cycle for cycle in driven.cycles if cycle.mode == "plan" and cycle.ttc < 9.0]
+    acts = next(k for k, cycle in enumerate(driven.cycles) if cycle.mode != "plan")
+    assert driven.cycles[acts].mode == "repair"
+    assert driven.cycles[acts].t == pytest.approx(waited[0].t + waited[0].f_ttr, abs=0.1 + 1e-9)
+    falls = np.diff([cycle.f_ttr for cycle in waited])
+    assert np.abs(falls + 0.1).max() < 0.1 + 1e-9  # it runs down with the clock
+    assert driven.struck is None
+    assert not touched(case, driven)
+    before = round(driven.cycles[acts].t / 0.1)
+    assert driven.states["x"][:before] == pytest.approx(driven.states["plan_x"][:before], abs=1e-6)
+
+
+def test_a_gentle_repair_is_gentle(cases):
+    driven = cases["scenario_1"].drive("recorded", "graded")
+    assert driven.struck is None
+    braked = -np.diff(driven.states["speed"]).min() / 0.1
+    assert braked < cases["scenario_1"].config.simulate.gentle[0] + 0.1
+
+
+def test_a_curve_is_looked_at_where_it_is(cases):
+    case = cases["scenario_1"]
+    watch, prepared = case.plan.hard.twin(), case.plan.prepared
+    start, scene = prepared.scene.initial_state, prepared.scene
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    traffic = Traffic(scene.obstacles, scene.n_steps)
+    looked = watch.look(prepared.reference, traffic=traffic, ego=ego)
+    assert looked.conflict.time == prepared.conflict.time
+    first = watch.answer(looked, visits=(0.0,))
+    assert first.f_ttr == 0.0
+    assert not first.kept
+    found = watch.answer(looked)
+    again = watch.answer(looked, enough=0.5)
+    assert again.kept
+    assert again.f_ttr == found.f_ttr
+    assert not watch.twin().answer(looked).kept
+    with pytest.raises(ConfigError, match="multiple of the step"):
+        watch.look(prepared.reference, traffic=traffic, ego=ego, now=0.03)
+
+
+def told(capsys, *arguments: str) -> tuple[int, str]:
+    status = main(list(arguments))
+    return status, capsys.readouterr().err
+
+
+def test_the_command_writes_rows_once(tmp_path, capsys):
+    out = tmp_path / "out"
+    given = ("simulate", "scenario_1_stops", "--reference", "planner", "--out", str(out))
+    keys = ("--set", "simulate.period=0.5", "simulate.lookahead=3")
+    assert main([*given, "--policy", "never", "f_ttr", "--shift", "0", "9.5", *keys]) == 0
+    text = capsys.readouterr().out
+    assert "| constant_velocity | f_ttr | 1 | 0 of 0 |" in text
+    rows = [json.loads(line) for line in (out / "simulation.jsonl").read_text().splitlines()]
+    assert [row["status"] for row in rows].count("not_driven") == 2
+    assert {row["detail"] for row in rows if row["status"] == "not_driven"} == {
+        "there is less than 1 s to drive"
+    }
+    with (out / "simulation.csv").open(newline="") as file:
+        assert len(list(csv.DictReader(file))) == 4
+    assert json.loads((out / "simulation.json").read_text())["constant_velocity, f_ttr"]["drives"] == 1
+    assert "never" in (out / "report.html").read_text("utf-8")
+    assert told(capsys, *given, "--policy", "never", *keys)[0] == 2
+    before = (out / "simulation.jsonl").read_bytes()
+    assert main([*given, "--policy", "never", *keys, "--resume"]) == 0
+    assert (out / "simulation.jsonl").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["scenario_1", "--policy", "later"], "policy 'later' is unknown; there are f_ttr"),
+        (["scenario_1", "--prediction", "later"], "prediction 'later' is unknown; there are recorded"),
+        (["scenario_1", "--policy", "f_ttr", "f_ttr"], "names one of its policies twice"),
+        (["scenario_1", "--reference", "later"], "reference 'later' is none of"),
+        (["scenario_1", "--shift", "-1"], "the traffic begins -1 s later"),
+        (["scenario_1", "--resume"], "name it with --out"),
+        (["scenario_1", "--policy", "f_ttr", "--set", "simulate.ttc=1.0"], "simulate.ttc has no effect"),
+        (["scenario_1", "--set", "simulate.trigger=smoke"], "it must be one of contact, margin"),
+        (["scenario_1", "--set", "driver=at_ttr"], "driver=at_ttr has no effect in it"),
+        (["nowhere.xml"], "nowhere.xml"),
+    ],
+)
+def test_what_cannot_be_driven_is_said_in_a_sentence(arguments, words, capsys):
+    status, error = told(capsys, "simulate", *arguments)
+    assert status == 2
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_an_empty_folder_is_no_folder_of_scenarios(tmp_path: Path, capsys):
+    assert told(capsys, "simulate", str(tmp_path)) == (
+        2, f"repair: {tmp_path} is a folder without CommonRoad scenario files (*.xml)\n"
+    )  # fmt: skip
