@@ -141,7 +141,7 @@ def test_what_is_no_configuration(thing, scene):
     refused(lambda: load_config(backend=thing) and repair.repair(scene, backend=thing))
 
 
-@pytest.mark.parametrize("thing", [5, [], "constant", np.zeros((4, 2)), Thing(), True], ids=str)
+@pytest.mark.parametrize("thing", [5, [], "constnat", np.zeros((4, 2)), Thing(), True], ids=str)
 def test_a_reference_of_a_wrong_type(thing, scene):
     assert "reference" in refused(lambda: repair.repair(scene, reference=thing))
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from repair.errors import RepairError
+from repair.errors import ConfigError, RepairError
 
 if TYPE_CHECKING:
     from repair.config import Config
@@ -47,7 +47,10 @@ def resolve(arguments: argparse.Namespace) -> Config:
     from repair.config import load_config
     from repair.reference.registry import named
 
-    given = {} if arguments.reference is None else named(arguments.reference)
+    try:
+        given = {} if arguments.reference is None else named(arguments.reference)
+    except ConfigError as error:
+        raise UsageError(str(error)) from None
     plain = all(value.isprintable() for value in given.values())
     texts = [f"reference.{key}={_quoted(value)}" for key, value in given.items()] if plain else []
     return load_config(
