@@ -160,6 +160,8 @@ def _against(groups: Mapping[tuple[str, str], Sequence[Row]]) -> list[str]:
             theirs = summary([row for row in rows if not row["mine"]])["for_nothing"]
             return mine / theirs if theirs else float("nan")
 
+        if not np.isfinite(share(both)):  # at_once never does
+            continue
         low, high = interval(both, share)
         lines.append(
             f"{prediction}: {policy} acts for nothing {share(both):.2f} [{low:.2f}, {high:.2f}] times as "
