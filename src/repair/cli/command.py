@@ -65,6 +65,7 @@ VERBS: tuple[Verb, ...] = (
         simulate.simulate_arguments,
         simulate.simulate,
     ),
+    Verb("animate", "a result as a film", written.animate_arguments, written.animate),
     Verb("sweep", "repair all scenarios of a folder", sweep.sweep_arguments, sweep.sweep),
     Verb("table1", "the paper's Table I, paper and ours", paper.table1_arguments, paper.table1),
     Verb("table2", "the paper's Table II, times on this machine", paper.table2_arguments, paper.table2),

@@ -1,4 +1,4 @@
-"""``repair certify`` and ``repair report``: what is asked of something written."""
+"""``repair certify``, ``report`` and ``animate``: what is asked of something written."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from repair.cli.arguments import UsageError
 
-__all__ = ["certify", "certify_arguments", "report", "report_arguments"]
+__all__ = ["animate", "animate_arguments", "certify", "certify_arguments", "report", "report_arguments"]
 
 
 def certify_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,4 +50,34 @@ def report(arguments: argparse.Namespace) -> int:
     made: Any = page_of_study if (folder / STORE_FILE).is_file() else page_of_result
     content = made(folder).encode("utf-8", "backslashreplace")
     print(*write_files(target.parent, {target.name: content}))
+    return 0
+
+
+def animate_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``repair animate``."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="what `repair run --out DIR` wrote")
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path,
+        help="a .gif, or an .mp4 where ffmpeg is there (default: DIR/animation.gif)",
+    )  # fmt: skip
+
+
+def animate(arguments: argparse.Namespace) -> int:
+    """The result as a film, beside the plan as it was."""
+    from functools import partial
+
+    from tqdm import tqdm
+
+    from repair.io.destination import require_folder
+    from repair.io.files import write_files
+    from repair.io.result_json import load_result
+    from repair.report.animation import animation
+
+    target: Path = arguments.out or arguments.folder / "animation.gif"
+    if target.suffix not in (".gif", ".mp4"):
+        raise UsageError(f"--out is {target.name}; a film is a .gif or an .mp4")
+    require_folder(target.parent)
+    outcome = load_result(arguments.folder)
+    bar = partial(tqdm, desc="frames", disable=None, leave=False)
+    print(*write_files(target.parent, {target.name: animation(outcome, target.suffix[1:], bar)}))
     return 0

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array
 from repair.r157.cases import KMH, LENGTH, WIDTH, Flags, Points
-from repair.r157.models import ASIDE, Careful, DriverModel, Seen, ttc
-from repair.r157.motion import published, stated
+from repair.r157.models import Careful, DriverModel, Seen, ttc
+from repair.r157.motion import ASIDE, published, sight, stated
 from repair.timegrid import INSTANT
+from repair.vehicle.parameters import load_vehicle
 
-__all__ = ["STEP", "UNTIL", "Driven", "drive", "keep"]
+__all__ = ["STEP", "UNTIL", "Driven", "drive", "keep", "unavoidable"]
 
 STEP = 0.025  # of the stated reading [s]: all delays are whole multiples, and the bound looks no closer
 UNTIL = 35.0  # [s]
+_TOGETHER = 1000  # points
 
 
 @dataclass(frozen=True)
@@ -70,12 +73,55 @@ def drive(points: Points, model: DriverModel) -> Driven:
     model : DriverModel
         ``model.stated`` says by which reading of the case, and how it is integrated.
     """
-    return _Run(points, model).driven()
+    return _in_parts(points, model)
 
 
 def keep(points: Points) -> Driven:
     """What becomes of the points where nobody reacts, as the regulation has the case."""
-    return _Run(points, None).driven()
+    return _in_parts(points, None)
+
+
+def unavoidable(points: Points, most: float) -> Flags:
+    """Where no speed along the lane avoids a contact, from when it is to be seen on.
+
+    Whoever keeps to his path is at no time behind who brakes fully from the sight on, nor ahead of who
+    accelerates fully. Where the one is in contact, and the other has not passed by then, nobody between them
+    is out of it.
+
+    Parameters
+    ----------
+    points : Points
+    most : float
+        Largest deceleration [m/s²]; accelerating, the engine of CommonRoad's vehicle 1 is a limit as well,
+        that at the first speed: none is stronger at a higher one.
+    """
+    return np.concatenate([_unavoidable(points.at(rows), most) for rows in _parts(points)])
+
+
+def _parts(points: Points) -> list[npt.NDArray[np.int64]]:
+    """Rows that are driven together: all at once would take gigabytes."""
+    return [np.arange(k, min(k + _TOGETHER, len(points))) for k in range(0, len(points), _TOGETHER)]
+
+
+def _in_parts(points: Points, model: DriverModel | None) -> Driven:
+    made = [_Run(points.at(rows), model).driven() for rows in _parts(points)]
+    return Driven(*(np.concatenate([getattr(one, field.name) for one in made]) for field in fields(Driven)))
+
+
+def _unavoidable(points: Points, most: float) -> Flags:
+    others, seen, own = stated(points, STEP, UNTIL), sight(points), points.ego * KMH
+    t = np.arange(len(others.rear))[:, None] * STEP
+    since = np.maximum(t - seen, 0.0)
+    braked = np.minimum(since, own / most)
+    back = own * (np.minimum(t, seen) + braked) - 0.5 * most * braked**2
+    engine = np.minimum(load_vehicle(1).engine_acceleration(own), most)
+    front = own * t + 0.5 * engine * since**2
+    rear = others.rear
+    if others.standing is not None and others.stuck is not None:
+        rear = np.where(others.stuck, others.rear, others.standing)
+    beside = others.offset < WIDTH - INSTANT if points.cut_in else np.ones_like(rear, dtype=bool)
+    meets = beside & (back > rear) & (front < rear + 2.0 * LENGTH)
+    return np.asarray(meets.any(axis=0))
 
 
 class _Run:

@@ -18,11 +18,21 @@ from repair.r157.cases import GRAVITY, LENGTH, Flags
 from repair.r157.motion import HEADWAY
 from repair.timegrid import INSTANT
 
-__all__ = ["MODELS", "Careful", "DriverModel", "Fuzzy", "Regulation", "Rss", "Seen", "ttc"]
+__all__ = [
+    "FULL",
+    "MODELS",
+    "Careful",
+    "DriverModel",
+    "FullBraking",
+    "Fuzzy",
+    "Regulation",
+    "Rss",
+    "Seen",
+    "ttc",
+]
 
 FULL = 0.774 * GRAVITY  # what all but the regulation's formula brake with [m/s²]
 JERK = 12.65  # how fast that is reached [m/s³]: 0.6 s
-ASIDE = 0.375  # how far off its lane's middle somebody is seen to leave it [m]
 
 
 @dataclass(frozen=True)
@@ -324,6 +334,31 @@ class Regulation:
     def brake(self, seen: Seen, step: float) -> Array:
         """6 m/s², at once."""
         return np.full_like(seen.speed, self.slows)
+
+
+@dataclass(frozen=True)
+class FullBraking:
+    """Braking as hard as possible from the sight on: what is left where nothing avoids it."""
+
+    most: float
+    stated: bool = True
+    name: ClassVar[str] = "full braking"
+    cases: ClassVar[tuple[str, ...]] = ("cut_in", "cut_out", "deceleration")
+    delay: ClassVar[float] = 0.0
+    keeps: ClassVar[bool] = False
+    latched: ClassVar[bool] = False
+
+    def following(self, speed: Array) -> Array:
+        """2 s."""
+        return HEADWAY * speed
+
+    def dangerous(self, seen: Seen) -> Flags:
+        """From when there is somebody to react to."""
+        return seen.exposed
+
+    def brake(self, seen: Seen, step: float) -> Array:
+        """All there is."""
+        return np.full_like(seen.speed, self.most)
 
 
 MODELS: Mapping[str, type[Careful] | type[Rss] | type[Fuzzy] | type[Regulation]] = MappingProxyType(

@@ -9,8 +9,9 @@ import numpy as np
 from repair.arrays import Array
 from repair.r157.cases import GRAVITY, KMH, LANE, LENGTH, WIDTH, Flags, Points
 
-__all__ = ["HEADWAY", "Others", "published", "stated"]
+__all__ = ["ASIDE", "HEADWAY", "Others", "published", "sight", "stated"]
 
+ASIDE = 0.375  # how far off its lane's middle somebody is seen to leave it [m]
 HEADWAY = 2.0  # behind the lead, in the cut-out and deceleration cases [s]
 CLEAR = LANE - WIDTH  # between the facing sides of two vehicles in the middle of neighbouring lanes [m]
 
@@ -132,3 +133,15 @@ def stated(points: Points, step: float, until: float) -> Others:
     across = np.where(stuck, np.minimum(across, points.lateral * met), across)
     return Others(step, rear, np.where(stuck, 0.0, speed), across, np.where(stuck, 0.0, lateral), across,
                   standing, stuck)  # fmt: skip
+
+
+def sight(points: Points) -> Array:
+    """When it is to be seen [s], as the regulation has it: somebody is 0.375 m off the middle of his lane.
+
+    In the cut-out, the lead is, or has run into who stands ahead. The deceleration is seen at once; who never
+    leaves his lane is never seen to.
+    """
+    if points.case == "deceleration":
+        return np.zeros(len(points))
+    seen = np.divide(ASIDE, points.lateral, out=np.full(len(points), np.inf), where=points.lateral > 0.0)
+    return np.asarray(seen if points.cut_in else np.minimum(seen, points.distance / (points.other * KMH)))

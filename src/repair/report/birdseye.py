@@ -12,7 +12,7 @@ from repair.outcome.data import Drawing, Outcome
 from repair.report.lines import continuation_lines, drawing_in, reference_line, repair_lines, title_of
 from repair.report.style import EGO, OBSTACLE, OTHERS, REFERENCE, FigureStyle
 
-__all__ = ["birdseye_figure"]
+__all__ = ["birdseye_figure", "placed", "window_around"]
 
 _LONG = 50.0  # of a longer way only that is shown on which something happens [m]
 _ELSEWHERE, _BEFORE = 0.5, 1.0  # who is so far from the reference [m], and how long before that [s]
@@ -43,7 +43,7 @@ def birdseye_figure(outcome: Outcome, style: FigureStyle | None = None) -> Any:
     drawing = drawing_in(outcome)
     reference = reference_line(outcome).line
     style = style or FigureStyle()
-    window, shape = _window(outcome)
+    window, shape = window_around(outcome)
     with rc_context(style.rc):
         size = style.width, 0.87 * style.width * shape + (1.3 + style.narrow) * style.font_size / 9.5
         figure = Figure(figsize=size, layout="constrained")
@@ -76,7 +76,7 @@ def birdseye_figure(outcome: Outcome, style: FigureStyle | None = None) -> Any:
     return figure
 
 
-def _window(outcome: Outcome) -> tuple[_Window, float]:
+def window_around(outcome: Outcome) -> tuple[_Window, float]:
     """Ranges of x and y that hold all that happens with some room, and their ratio of height to width."""
     drawing = drawing_in(outcome)
     reference = drawing.lines[0]
@@ -136,12 +136,12 @@ def _draw_vehicles(axes: Any, outcome: Outcome, window: _Window) -> None:
             if hit and other.role != "static":
                 labels.add(f"{k * dt:.3g} s", outline, OBSTACLE)
         if k < len(drawing.ego):
-            corners = _placed(body, *drawing.ego[k])
+            corners = placed(body, *drawing.ego[k])
             axes.fill(*corners.T, facecolor=EGO, edgecolor=EGO, alpha=dark, zorder=3)
             labels.add(f"{k * dt:.3g} s", corners, EGO)
     _draw_motion(axes, drawing, window)
     if drawing.unrepaired is not None:
-        ghost = _placed(body, *drawing.unrepaired)
+        ghost = placed(body, *drawing.unrepaired)
         axes.fill(*ghost.T, fill=False, ec=REFERENCE, ls="--", zorder=5, label=f"ego unrepaired, {at:.3g} s")
     axes.fill([], [], color=EGO, alpha=0.75, label=f"ego (dark: {at:.3g} s)")
     if opponent is not None:
@@ -169,7 +169,7 @@ def _draw_impact(axes: Any, outcome: Outcome) -> None:
     steps = told["trajectory"]
     columns = (steps["x_m"], steps["y_m"], np.unwrap(steps["orientation_rad"]))
     x, y, psi = (float(np.interp(time, steps["t_s"], column)) for column in columns)
-    corners = _placed(drawing_in(outcome).body, x, y, psi)
+    corners = placed(drawing_in(outcome).body, x, y, psi)
     axes.fill(*corners.T, fill=False, ec="#CC79A7", lw=1.8, zorder=6, label=f"ego then, {time:.3g} s")
     words = f"impact, {told['impact_speed_mps']:.3g} m/s"
     axes.plot(*place, ls="", marker="*", ms=10, color="#CC79A7", mec="#000000", zorder=7, label=words)
@@ -231,6 +231,7 @@ def _filled(outline: Array) -> Array:
     return np.asarray((middle + shares[:, None] * (edges - middle)).reshape(-1, 2))
 
 
-def _placed(corners: Array, x: float, y: float, heading: float) -> Array:
+def placed(corners: Array, x: float, y: float, heading: float) -> Array:
+    """Corners (V, 2) seen from a middle, turned by a heading [rad] and put at a place [m]."""
     cos, sin = np.cos(heading), np.sin(heading)
     return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + [x, y])
