@@ -14,7 +14,7 @@ from repair.errors import OutputError
 from repair.r157.cases import LENGTH, grid
 from repair.r157.motion import stated
 from repair.r157.scenario import scene_at
-from repair.report.animation import animation, frames_of
+from repair.report.film.animation import animation, frames_of
 
 
 @pytest.fixture(scope="module")

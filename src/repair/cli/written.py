@@ -71,7 +71,7 @@ def animate(arguments: argparse.Namespace) -> int:
     from repair.io.destination import require_folder
     from repair.io.files import write_files
     from repair.io.result_json import load_result
-    from repair.report.animation import animation
+    from repair.report.film.animation import animation
 
     target: Path = arguments.out or arguments.folder / "animation.gif"
     if target.suffix not in (".gif", ".mp4"):

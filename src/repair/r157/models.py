@@ -23,7 +23,6 @@ __all__ = [
     "MODELS",
     "Careful",
     "DriverModel",
-    "FullBraking",
     "Fuzzy",
     "Regulation",
     "Rss",
@@ -334,31 +333,6 @@ class Regulation:
     def brake(self, seen: Seen, step: float) -> Array:
         """6 m/s², at once."""
         return np.full_like(seen.speed, self.slows)
-
-
-@dataclass(frozen=True)
-class FullBraking:
-    """Braking as hard as possible from the sight on: what is left where nothing avoids it."""
-
-    most: float
-    stated: bool = True
-    name: ClassVar[str] = "full braking"
-    cases: ClassVar[tuple[str, ...]] = ("cut_in", "cut_out", "deceleration")
-    delay: ClassVar[float] = 0.0
-    keeps: ClassVar[bool] = False
-    latched: ClassVar[bool] = False
-
-    def following(self, speed: Array) -> Array:
-        """2 s."""
-        return HEADWAY * speed
-
-    def dangerous(self, seen: Seen) -> Flags:
-        """From when there is somebody to react to."""
-        return seen.exposed
-
-    def brake(self, seen: Seen, step: float) -> Array:
-        """All there is."""
-        return np.full_like(seen.speed, self.most)
 
 
 MODELS: Mapping[str, type[Careful] | type[Rss] | type[Fuzzy] | type[Regulation]] = MappingProxyType(

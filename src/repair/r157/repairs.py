@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from repair.arrays import Array
 from repair.r157.cases import Flags, Points
 from repair.r157.drive import drive, keep
-from repair.r157.models import FULL, FullBraking
-from repair.r157.motion import sight
+from repair.r157.models import FULL, Seen
+from repair.r157.motion import HEADWAY, sight
 from repair.r157.results import Fate, Results, by_models
 from repair.timegrid import INSTANT, steps_until
 
@@ -73,6 +73,31 @@ class _Task:
     until: tuple[float, ...]  # horizon [s]
     seen: tuple[float, ...]  # [s]
     backends: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FullBraking:
+    """Braking as hard as possible from the sight on: what is left where nothing avoids it."""
+
+    most: float
+    stated: bool = True
+    name: ClassVar[str] = "full braking"
+    cases: ClassVar[tuple[str, ...]] = ("cut_in", "cut_out", "deceleration")
+    delay: ClassVar[float] = 0.0
+    keeps: ClassVar[bool] = False
+    latched: ClassVar[bool] = False
+
+    def following(self, speed: Array) -> Array:
+        """2 s."""
+        return HEADWAY * speed
+
+    def dangerous(self, seen: Seen) -> Flags:
+        """From when there is somebody to react to."""
+        return seen.exposed
+
+    def brake(self, seen: Seen, step: float) -> Array:
+        """All there is."""
+        return np.full_like(seen.speed, self.most)
 
 
 def with_repairs(points: Points, asked: Asked, *, quiet: bool = False) -> Results:
