@@ -92,6 +92,7 @@ def shell_lines(page: Path) -> Iterator[tuple[str, list[str]]]:
     fenced = [found["text"] for found in _FENCE.finditer(text) if found["language"] == "bash"]
     for block in [*fenced, *_INDENTED.findall(text)]:
         for line in re.sub(r"\\\n\s*", "", block).splitlines():
+            line = line.partition(" && ")[0]  # what follows is another program's
             split = words(line) if line.strip().startswith(("repair ", "env ")) else []
             if split and split[0] == "repair":
                 yield line.strip(), split[1:]
