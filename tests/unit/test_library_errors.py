@@ -68,6 +68,9 @@ def copied(written, tmp_path):
 class Thing:
     """Something that is none of ours."""
 
+    def __repr__(self):  # the name of a test has to be the same in every process
+        return "Thing()"
+
 
 NOTHINGS = [
     None,
