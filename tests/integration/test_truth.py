@@ -183,7 +183,7 @@ def test_what_makes_no_difference(
 
 
 def test_more_clearance_is_never_a_later_conflict(write: Callable[[str], Path]) -> None:
-    for seed in range(2000, 2012):
+    for seed in range(2000, 2006):
         file = write(crossing(seed).text)
         times = [answer(file, "ego", f"checker.clearance={c}").ttc for c in (0.0, 0.1, 0.3, 1.0)]
         assert (np.diff([min(t, 99.0) for t in times]) <= 1e-9).all(), crossing(seed).words

@@ -33,7 +33,7 @@ _CAR_TURN = (0.2, 3.08, 11.99)  # a short begin and a long end of the turn (0.15
 # From standstill (2.1 m/s²), in the turn (1.0), out of it (2.1) and on (1.65), to 13.7 m/s (assumed)
 _CAR_PROFILE = ((1.4, 1.94), (0.8, 0.67), (2.0, 2.28), (3.7, 1.6))
 # The same beginning, then the car lets the ego pass: it brakes and stands before the ego's lane (ours).
-_CAR_STOPS = ((1.4, 1.94), (0.68, -4.0))
+_CAR_STOPS = ((1.4, 1.94), (0.7, -3.88))
 
 
 def _junction() -> list[Any]:
