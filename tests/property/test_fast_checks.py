@@ -40,7 +40,7 @@ def driven(rng, n=60, spread=5.0):
 # ------------------------------------------------------------------- the path
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_what_keeps_to_the_path_is_carried_as_anything_else(seed):
     rng = np.random.default_rng(seed)
@@ -59,7 +59,7 @@ def test_what_keeps_to_the_path_is_carried_as_anything_else(seed):
     np.testing.assert_allclose(kept.xy, frame.position(motion[0]), rtol=1e-12, atol=1e-12)
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(st.lists(st.booleans(), min_size=1, max_size=12))
 def test_the_heading_of_a_stop_is_that_of_the_last_moving_sample(moving):
     heading, fallback = np.arange(len(moving)) + 1.0, np.full(len(moving), -1.0)
@@ -110,7 +110,7 @@ def ragged_road(rng):
     return RoadBoundary(SimpleNamespace(lanelet_network=network), EGO)
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_a_box_around_several_poses_is_on_the_road_only_if_they_are(seed):
     rng = np.random.default_rng(seed)
@@ -146,7 +146,7 @@ def test_poses_that_are_nowhere_are_off_the_road(bad):
         assert road.first_off_road(*poses) == 7
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_the_corridor_holds_only_what_is_on_the_road(seed):
     rng = np.random.default_rng(seed)
@@ -216,7 +216,7 @@ def crowd(rng, steps=20):
     return obstacles
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_looking_at_blocks_drops_no_contact(seed):
     rng = np.random.default_rng(seed)
@@ -234,7 +234,7 @@ def test_looking_at_blocks_drops_no_contact(seed):
 # --------------------------------------------------------------------- limits
 
 
-@settings(max_examples=500, derandomize=True, deadline=None)
+@settings(max_examples=200, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_what_is_well_within_the_limits_breaks_none(seed):
     """Of a spline along a bent frame: what the look at the samples settles, its own derivatives confirm."""
@@ -308,7 +308,7 @@ def ride(rng, vehicle, dt):
     return xy, speed, slip, orientation
 
 
-@settings(max_examples=500, derandomize=True, deadline=None)
+@settings(max_examples=200, derandomize=True, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 3, 4]))
 def test_clearly_drivable_is_drivable_step_by_step(seed, type_id):
     rng = np.random.default_rng(seed)

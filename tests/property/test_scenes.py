@@ -227,7 +227,7 @@ def first_touch(result: RepairResult, made: list[Thing]) -> str | None:
 
 
 @given(cases())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_what_is_called_feasible_is(case: tuple[Any, list[Thing], Config]) -> None:
     scene, made, config = case
     if scene is None:

@@ -327,7 +327,14 @@ def test_a_terminal_that_knows_ascii_alone(strange):
     assert as_json("plain ²") in ("plain ²", "plain \\u00b2")
 
 
-@pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)])
+@pytest.mark.parametrize(
+    "closed",
+    [
+        pytest.param((1,), marks=pytest.mark.exhaustive),
+        pytest.param((2,), marks=pytest.mark.exhaustive),
+        (0, 1, 2),
+    ],
+)
 def test_streams_that_are_closed(closed, path, tmp_path):
     def close():
         for number in closed:

@@ -72,12 +72,12 @@ def falsely_judged(cases: list[Case], folder) -> tuple[int, list[str]]:
 
 
 def test_what_commonroad_accepts_is_drivable(tmp_path):
-    few = [case for case in driven.cases(60) if case.model == "KS" and case.dt >= 0.1][:14]
+    few = [case for case in driven.cases(60) if case.model == "KS" and case.dt >= 0.1][:8]
     noisy = [replace(case, noise=NOISE[k % 3]) for k, case in enumerate(few[::3])]
     other = [case for case in driven.cases(60) if case.model in ("PM", "ST") and case.dt >= 0.2][:4]
     accepted, wrong = falsely_judged([*few, *noisy, *other], tmp_path)
     assert wrong == []
-    assert accepted >= 18
+    assert accepted >= 11
 
 
 @pytest.mark.exhaustive

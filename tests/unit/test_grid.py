@@ -78,7 +78,7 @@ def boxes_of(rows):
     ]
 
 
-@settings(deadline=None)
+@settings(max_examples=20)
 @given(ROWS, st.sampled_from(["road", "none"]), st.sampled_from([None, -0.5, 0.3]))
 def test_tables_and_general_path_make_the_same_problems(rows, lateral, margin):
     boxes = boxes_of(rows)
