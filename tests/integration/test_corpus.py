@@ -41,6 +41,7 @@ def kinds(found: Examined) -> set[str]:
 # -- all is well -----------------------------------------------------------------------------------
 
 
+@pytest.mark.exhaustive
 def test_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``python -m tests.corpus FOLDER`` with a file in a folder below, one that is refused, and protobuf."""
     (tmp_path / "below").mkdir()

@@ -72,6 +72,7 @@ def test_in_another_process(files: list[Path], once: dict[str, str], tmp_path: P
     assert content(tmp_path) == once
 
 
+@pytest.mark.exhaustive
 def test_any_number_of_workers(files: list[Path], tmp_path: Path) -> None:
     for path in files:
         shutil.copy(path, tmp_path)

@@ -298,6 +298,7 @@ def strange(path, tmp_path):
     return file
 
 
+@pytest.mark.exhaustive
 def test_names_that_are_no_utf8(strange, capsys, tmp_path):
     out = Path(os.fsdecode(os.fsencode(tmp_path) + b"/out\xff"))
     assert main(["run", str(strange), "--reference", "constant", "--out", str(out)]) == 0

@@ -410,6 +410,7 @@ def test_the_outcome_that_saving_gives_is_the_one_that_is_read(found: RepairResu
     assert found.to_dict()["solution_file"] is None  # what is in memory names no files
 
 
+@pytest.mark.exhaustive
 def test_figures_from_the_folder_are_those_that_were_saved(found: RepairResult, folder: Path) -> None:
     outcome = load_result(folder)
     assert outcome.drawing is not None
