@@ -104,9 +104,9 @@ class Prepared(Situation):
             return None
         return partial(too_late, self, self.config.bound)
 
-    @cached_property
+    @property
     def hopeless(self) -> Quick:
-        """Says of a t_rep whether it is proven in a moment that nothing is feasible there."""
+        """Says of a t_rep whether a moment proves that nothing is feasible there; one for each search."""
         return Quick(self)
 
 

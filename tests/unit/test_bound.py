@@ -261,3 +261,13 @@ def test_proofs_leave_out_what_finds_nothing_and_change_no_answer(tmp_path, rule
     left_out = [[any("proven" in text for text in p.tried) for p in found[k].probes] for k in (True, False)]
     assert any(left_out[0])
     assert not any(left_out[1])
+
+
+def test_a_search_does_not_hang_on_what_was_searched_before(tmp_path):
+    keys = ["backend=casadi", "fallback=[]", "search.delta_t=0.2", "search.rule=scan"]
+    situation = prepared(tmp_path, wall(), *keys)
+    backend = make_backend("casadi", situation.config)
+    once, again = (find(situation, backend) for _ in range(2))
+    coarse = find(situation, backend, settings=replace(situation.config.search, delta_t=0.4))
+    assert [p.tried for p in once.probes] == [p.tried for p in again.probes]
+    assert [p.tried for p in once.probes][::2] == [p.tried for p in coarse.probes]

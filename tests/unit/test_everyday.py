@@ -33,7 +33,7 @@ def test_quiet_is_the_answer_alone(capsys):
 
 
 def test_verbose_is_python_logging_on_standard_error():
-    """In a process of its own: loggers are whatever was done to them in this one."""
+    """In a process of its own: import-linter, in test_architecture.py, switches loggers off."""
     command = [sys.executable, "-m", "repair", "run", "scenario_1", "-vv", "--quiet"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     said = [line for line in done.stderr.splitlines() if line.startswith("repair.")]

@@ -139,7 +139,10 @@ def proof_at(situation: Situation, t_rep: float, settings: BoundConfig, kind: st
     if not _provable(situation, kind) or not t_rep < situation.conflict.time < math.inf:
         return None
     world, begin = _World(situation, settings), time.thread_time()
-    late = lambda: time.thread_time() - begin > settings.time_limit  # noqa: E731
+
+    def late() -> bool:
+        return time.thread_time() - begin > settings.time_limit
+
     return _proof(kind, world, world.sample(t_rep), settings.nodes, late)[1]
 
 
@@ -152,7 +155,8 @@ def _provable(situation: Situation, kind: str) -> bool:
 class Quick:
     """Whether it is proven too late at a time, for a search that would rather not look there for long.
 
-    Only small proofs are looked for: an answer of no says nothing.
+    Only small proofs are looked for: an answer of no says nothing. What was asked is remembered; each search
+    has one of its own, so that no answer or time hangs on what was searched before.
 
     Parameters
     ----------
@@ -177,12 +181,12 @@ class Quick:
             return True
         if t_rep in self._asked or not t_rep < self._situation.conflict.time < math.inf:
             return False
-        self._asked.add(t_rep)
         if not _provable(self._situation, "search"):
             return False
         in_time()
         self._world = self._world or _World(self._situation, BoundConfig())
         if _proof("search", self._world, self._world.sample(t_rep), _FEW, _in_time)[1] is None:
+            self._asked.add(t_rep)
             return False
         self._since = t_rep
         return True

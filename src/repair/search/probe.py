@@ -78,9 +78,8 @@ class Budget:
     limit: float | None
     begin: float
     clock: Callable[[], float]
-    hopeless: Callable[[float], bool] | None = (
-        None  # whether it is proven that nothing is feasible at a t_rep
-    )
+    # whether it is proven that nothing is feasible at a t_rep
+    hopeless: Callable[[float], bool] | None = None
     cut: bool = False  # the last probe would have gone on, had there been time
 
     @property
