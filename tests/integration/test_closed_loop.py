@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 from shapely import affinity
 
 from repair.cli import main
@@ -17,7 +20,9 @@ from repair.paper.synthetic import write_scenario
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
-from repair.simulate.many.case import Case, cases_of, plan_on, simulation_config
+from repair.simulate.eyes import Eyes
+from repair.simulate.many.case import Case, case_at, plan_on, simulation_config
+from repair.simulate.many.task import drive_of, run_drive
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +32,7 @@ def cases(tmp_path_factory) -> dict[str, Case]:
     config = simulation_config(overrides=["reference.source=planner"])
     for name in ("scenario_1", "scenario_1_stops"):
         scene = load_scene(write_scenario(name, folder), config)
-        ((_, case),) = cases_of(plan_on(scene, config), config, (0.0,))
-        made[name] = case
+        made[name] = case_at(plan_on(scene, config), config, 0.0)
     return made
 
 
@@ -82,6 +86,17 @@ def test_a_gentle_repair_is_gentle(cases):
     assert braked < cases["scenario_1"].config.simulate.gentle[0] + 0.1
 
 
+@pytest.mark.parametrize("doubt, sure", [(0.0, True), (0.05, True), (20.0, False)])
+def test_a_contact_is_sure_that_is_there_ahead_and_behind(cases, doubt, sure):
+    case, start = cases["scenario_1"], cases["scenario_1"].plan.scene.initial_state
+    config = replace(case.config, simulate=replace(case.config.simulate, doubt=doubt))
+    grounds = replace(case.grounds("recorded"), config=config)
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    sight = Eyes(grounds).sight(case.curve, ego, 0)
+    assert sight.alarming("contact")
+    assert sight.sure() is sure
+
+
 def test_a_curve_is_looked_at_where_it_is(cases):
     case = cases["scenario_1"]
     watch, prepared = case.plan.hard.twin(), case.plan.prepared
@@ -102,31 +117,67 @@ def test_a_curve_is_looked_at_where_it_is(cases):
         watch.look(prepared.reference, traffic=traffic, ego=ego, now=0.03)
 
 
+class Here:
+    """Drives are made in this process, by the code that a process of their own would run."""
+
+    name, most = "here", 1e9
+
+    def __init__(self, count, work):
+        assert work is run_drive
+
+    def now(self):
+        return [self]
+
+    def close(self):
+        pass
+
+    def give(self, task):
+        row, whole = drive_of(task)
+        answer = Future()
+        answer.set_result((row | {"worker_peak_memory_mb": 1.0}, whole))
+        return answer
+
+    def ready(self):
+        return True
+
+
 def told(capsys, *arguments: str) -> tuple[int, str]:
     status = main(list(arguments))
     return status, capsys.readouterr().err
 
 
-def test_the_command_writes_rows_once(tmp_path, capsys):
+def test_the_command_writes_rows_once_and_films_them(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("repair.study.engine.LocalLanes", Here)
     out = tmp_path / "out"
     given = ("simulate", "scenario_1_stops", "--reference", "planner", "--out", str(out))
     keys = ("--set", "simulate.period=0.5", "simulate.lookahead=3")
-    assert main([*given, "--policy", "never", "f_ttr", "--shift", "0", "9.5", *keys]) == 0
+    assert main([*given, "--policy", "never", "f_ttr", "--shift", "8", "9.5", *keys]) == 0
     text = capsys.readouterr().out
     assert "| constant_velocity | f_ttr | 1 | 0 of 0 |" in text
-    rows = [json.loads(line) for line in (out / "simulation.jsonl").read_text().splitlines()]
-    assert [row["status"] for row in rows].count("not_driven") == 2
-    assert {row["detail"] for row in rows if row["status"] == "not_driven"} == {
-        "there is less than 1 s to drive"
-    }
     with (out / "simulation.csv").open(newline="") as file:
-        assert len(list(csv.DictReader(file))) == 4
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == ["driven", "driven", "not_driven", "not_driven"]
+    assert {row["detail"] for row in rows[2:]} == {"there is less than 1 s to drive"}
     assert json.loads((out / "simulation.json").read_text())["constant_velocity, f_ttr"]["drives"] == 1
     assert "never" in (out / "report.html").read_text("utf-8")
     assert told(capsys, *given, "--policy", "never", *keys)[0] == 2
-    before = (out / "simulation.jsonl").read_bytes()
-    assert main([*given, "--policy", "never", *keys, "--resume"]) == 0
-    assert (out / "simulation.jsonl").read_bytes() == before
+    monkeypatch.setattr("repair.simulate.many.task.case_at", lambda *_: pytest.fail("it is there"))
+    assert main([*given, "--policy", "never", "--shift", "8", *keys, "--resume"]) == 0
+    (out / "report.html").unlink()
+    assert main(["report", str(out)]) == 0
+    assert "never" in (out / "report.html").read_text("utf-8")
+    filmed(out, capsys)
+
+
+def filmed(out: Path, capsys) -> None:
+    """The film of the only drive that is there, and what there is none of."""
+    assert main(["animate", str(out), "--policy", "never"]) == 0
+    assert "never: one of 1 that fit" in capsys.readouterr().out
+    with Image.open(out / "animation.gif") as film:
+        assert 15 < film.n_frames < 25
+    status, error = told(capsys, "animate", str(out), "--policy", "f_ttr", "--shift", "3")
+    assert status == 2
+    assert "holds no drive with shift_s 3.0, policy f_ttr" in error
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from repair.errors import OutputError
 from repair.r157.cases import LENGTH, grid
 from repair.r157.motion import stated
 from repair.r157.scenario import scene_at
-from repair.report.film.animation import animation, frames_of
+from repair.report.film.frames import animation, frames_of
+from repair.report.film.result import film_of_result
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def middle(patch):
 def test_everybody_is_where_he_is(cut_in):
     outcome, point = cut_in
     for k in (0, 7, 15):
-        (figure,) = frames_of(outcome, [k])
+        (figure,) = frames_of(film_of_result(outcome), [k])
         others = stated(point, 0.1, 5.0)
         x, y = float(others.rear[k, 0]) + LENGTH, float(others.offset[k, 0])
         for axes in figure.axes:
@@ -53,7 +54,7 @@ def test_the_panels_part_at_the_f_ttr(cut_in):
     at = round(outcome.f_ttr / 0.1)
 
     def egos(k):
-        (figure,) = frames_of(outcome, [k])
+        (figure,) = frames_of(film_of_result(outcome), [k])
         return [middle(axes.patches[-1]) for axes in figure.axes], figure
 
     (planned, driven), figure = egos(at - 1)
@@ -71,7 +72,7 @@ def test_a_gif_has_a_frame_for_each_step(cut_in):
 
     outcome, _ = cut_in
     outcome = replace(outcome, drawing=replace(outcome.drawing, until=0.4))
-    with Image.open(io.BytesIO(animation(outcome))) as film:
+    with Image.open(io.BytesIO(animation(film_of_result(outcome)))) as film:
         steps = round(outcome.drawing.until / 0.1) + 1
         assert (
             abs(film.n_frames - steps) <= 1
@@ -82,12 +83,12 @@ def test_a_gif_has_a_frame_for_each_step(cut_in):
 def test_what_is_no_film_is_refused(cut_in, tmp_path, capsys, monkeypatch):
     outcome, _ = cut_in
     with pytest.raises(OutputError, match=r"a \.gif or an \.mp4"):
-        animation(outcome, "avi")
+        animation(film_of_result(outcome), "avi")
     from matplotlib.animation import FFMpegWriter
 
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(OutputError, match="ffmpeg, which is not there"):
-        animation(outcome, "mp4")
+        animation(film_of_result(outcome), "mp4")
     assert main(["animate", str(tmp_path), "--out", "film.txt"]) == 2
     assert "a film is a .gif or an .mp4" in capsys.readouterr().err
     assert main(["animate", str(tmp_path)]) == 2

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,12 +21,16 @@ from repair.simulate.contact import first_struck, least_distance
 from repair.simulate.curves import ahead_of, resumed
 from repair.simulate.data import CycleRecord, Driven
 from repair.simulate.many.case import simulation_config
-from repair.simulate.many.store import ROWS_FILE, Rows
-from repair.simulate.measures import row_of
+from repair.simulate.many.run import Simulation, drives_in, tasks_of
+from repair.simulate.measures import SIMULATION, row_of
 from repair.simulate.near import anybody_near
 from repair.simulate.policies.registry import POLICIES, make_policy
 from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
-from repair.simulate.world import Beliefs, World, widened
+from repair.simulate.watch import Found
+from repair.simulate.world import Beliefs, World, displaced, widened
+from repair.study.rows import strict
+from repair.study.store import Store
+from repair.study.task import packed
 from repair.vehicle.model import vehicle_model
 from repair.world.collision import CollisionWorld
 
@@ -142,6 +146,16 @@ def test_everybody_is_widened_along_the_way_and_nobody_backs_up(error, v):
     assert (np.diff(behind) > -1e-9).all()
     assert (plain - behind <= 0.5 * error * t**2 + 1e-9).all()
     np.testing.assert_allclose(found[1].rectangles[:, :2], found[1].states[:, :2])
+
+
+def test_who_is_displaced_is_ahead_or_behind_and_who_stands_stays():
+    moves, stands = body(straight(v=8.0)), body(straight(v=0.0), name=8)
+    ahead, there = displaced((moves, stands), 1.0, DT)
+    behind, _ = displaced((moves, stands), -1.0, DT)
+    assert there is stands
+    assert ahead.states[20, 0] == pytest.approx(16.0 + 2.0)
+    assert behind.states[20, 0] == pytest.approx(16.0 - 2.0)
+    assert ahead.states[0, 0] == behind.states[0, 0] == 0.0
 
 
 # -- curves -----------------------------------------------------------------------------------------
@@ -285,7 +299,7 @@ def test_measures_by_hand():
 
 def made_row(file, policy, *, hit=None, struck=None, acted=0, peak=0.0, margin=False):
     return {
-        "file": file, "plan": "constant", "shift_s": 0.0, "prediction": "lane", "policy": policy,
+        "file": file, "reference": "constant", "shift_s": 0.0, "prediction": "lane", "policy": policy,
         "status": "driven", "plan_contact_s": hit, "plan_contact_from_behind": False if hit else None,
         "plan_margin": margin or hit is not None, "contact_s": struck, "contact_from_behind": struck and True,
         "impact_speed_mps": struck and 3.0, "within_verified": False, "interventions": acted,
@@ -318,21 +332,98 @@ def test_the_table_counts():
     assert "lane: f_ttr acts for nothing 0.67" in text
 
 
-def test_rows_are_kept_as_they_come_and_a_torn_one_is_made_again(tmp_path):
-    rows = Rows(tmp_path)
-    rows.add("one", {"a": 1})
-    rows.add("two", {"a": 2})
-    with (tmp_path / ROWS_FILE).open("a") as file:
-        file.write('{"key": "three", "a"')
-    again = Rows(tmp_path)
-    assert [row["a"] for row in again] == [1, 2]
-    assert "three" not in again
-    again.add("three", {"a": 3})
-    lines = (tmp_path / ROWS_FILE).read_text().splitlines()
-    assert [json.loads(line)["key"] for line in lines] == ["one", "two", "three"]
-    (tmp_path / ROWS_FILE).write_text("[]\n")
-    with pytest.raises(RepairError, match="line 1 is no row"):
-        Rows(tmp_path)
+def simulation(tmp_path, **changed) -> Simulation:
+    """Two predictions and two policies on one road; nothing is driven."""
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    file.write_text("<commonRoad/>", encoding="utf-8")
+    config = simulation_config(overrides=changed.pop("overrides", ()))
+    given = {
+        "files": (file,), "policies": ("f_ttr", "graded"), "predictions": ("recorded", "lane"),
+        "plans": ("constant",), "shifts": (0.0, 1.0), "config": config,
+    }  # fmt: skip
+    return Simulation(**{**given, **changed})
+
+
+def test_a_drive_is_made_again_where_what_it_reads_has_changed(tmp_path):
+    tasks = tasks_of(simulation(tmp_path))
+    keys = {tuple(task.varied.values()): task.key for task in tasks}
+    assert len(set(keys.values())) == 8
+    assert [task.varied["shift_s"] for task in tasks] == [0.0] * 4 + [1.0] * 4
+
+    def changed(*overrides):
+        there = tasks_of(simulation(tmp_path, overrides=overrides))
+        return {task.varied["policy"] for task in there if keys[tuple(task.varied.values())] != task.key}
+
+    assert changed("simulate.doubt=0") == {"graded"}
+    assert changed("simulate.gentle=[3.0]") == {"graded"}
+    assert changed("simulate.back=2.0") == {"graded", "f_ttr"}
+
+
+def test_drives_are_stored_with_their_columns(tmp_path):
+    tasks = tasks_of(simulation(tmp_path, policies=("f_ttr",), predictions=("lane",)))
+    row = {**made_row("a", "f_ttr", hit=3.0, acted=1), "variation": "", "backend": "ego"}
+    stored = strict({name: row.get(name) for name in SIMULATION.columns}, SIMULATION)
+    cycles = {"cycles": [{"ms": 5.0}]}
+    with Store(tmp_path, SIMULATION) as store:
+        store.plan(tasks)
+        store.add(tasks[0], stored, packed(cycles, None))
+        store.add(tasks[1], {**stored, "status": "not_driven"}, None)
+    with Store(tmp_path, SIMULATION, readonly=True) as store:
+        one, two = drives_in(store)
+    assert (one["policy"], one["shift_s"], one["plan_margin"], one["drive"]) == ("f_ttr", 0.0, True, cycles)
+    assert (two["shift_s"], two["status"]) == (1.0, "not_driven")
+    assert "drive" not in two
+    with pytest.raises(RepairError, match=r"holds no study.sqlite; `repair study`"):
+        Store(tmp_path, readonly=True)
+    with pytest.raises(RepairError, match="column interventions holds"):
+        strict({**stored, "interventions": "often"}, SIMULATION)
+
+
+# -- when the plan is left --------------------------------------------------------------------------
+
+SOON, LATER = 0.1, 0.9  # before the next cycle, and after it
+
+
+class Seen:
+    """A sight of the tests' own: what is found at each limit, and whether the contact is sure."""
+
+    period = 0.2
+
+    def __init__(self, gentle, hard=LATER, *, sure=True, mode="plan", now=0.0, first=None):
+        self.eyes = SimpleNamespace(gentle=gentle)
+        self.found, self.cycle, self.first = gentle, made(hard, "hard"), made(first, "first")
+        self.mode, self.now, self.asked = mode, now, []
+        self.sure = lambda: sure
+
+    def gently(self, level, *, at_once=False):
+        self.asked.append((level, at_once))
+        return made(self.found[level], level)
+
+
+def made(f_ttr, name) -> Found:
+    return Found(f_ttr, None if f_ttr is None else name, 3.0, False, True)
+
+
+def test_a_gentle_repair_is_waited_on_and_driven_where_the_contact_is_sure():
+    policy = make_policy("graded", SimulateConfig())
+    assert policy.decide(Seen((LATER, LATER))).f_ttr == LATER
+    assert policy.decide(Seen((SOON, LATER))).curve == 0
+    assert policy.decide(Seen((SOON, LATER), sure=False)).kind == "keep"
+    assert policy.decide(Seen((SOON, LATER), SOON, sure=False)).curve == "hard"
+    assert policy.decide(Seen((None, SOON))).curve == 1  # the first limit is passed over
+    assert policy.decide(Seen((LATER, SOON), now=0.2)).curve == 1  # and not gone back to
+    assert policy.decide(Seen((LATER, SOON), now=0.8)).f_ttr == LATER  # before the conflict is over
+    assert policy.decide(Seen((None, None), now=1.0)).f_ttr == LATER
+
+
+def test_off_the_plan_nothing_is_waited_for():
+    policy = make_policy("graded", SimulateConfig())
+    sight = Seen((None, 0.0), mode="repair", sure=False)
+    assert policy.decide(sight).curve == 1
+    assert sight.asked == [(0, True), (1, True)]
+    assert policy.decide(Seen((None, None), mode="repair", first=0.0)).curve == "first"
+    assert policy.decide(Seen((None, None), LATER, mode="repair")).f_ttr == LATER
+    assert policy.decide(Seen((None, None), SOON, mode="repair")).curve == "hard"
 
 
 # -- names and settings -----------------------------------------------------------------------------

@@ -42,6 +42,13 @@ class SimulateConfig:
         low=0.0,
         high=20.0,
     )
+    doubt: float = setting(
+        0.5,
+        "policy graded: a gentle repair begins where contact is met with everybody half of this times t² "
+        "ahead, and behind [m/s²]; 0: wherever it is met",
+        low=0.0,
+        high=20.0,
+    )
     deadline: float | None = setting(
         None, "the search of a cycle ends by then [s]; null: when it is done", low=1e-3, high=1e3
     )

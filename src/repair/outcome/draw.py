@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from repair.terminal.verdict import Terminal
 from repair.timegrid import INSTANT, STEP
 from repair.vehicle.states import DrivenStates
 
-__all__ = ["drawing_of"]
+__all__ = ["body_of", "drawing_of", "road_between", "rounded"]
 
 _DIGITS = 4  # of metres and seconds: what is read from a file is what was drawn at once
 _AROUND = 20.0  # road and traffic are shown at least this far beyond what is driven [m]
@@ -57,34 +58,31 @@ def drawing_of(
     shown = [moment, 0, end, moment // 2, *([round(hit / dt)] if np.isfinite(hit) else [])]
     steps = tuple(dict.fromkeys(shown))
     lines = (*_lines(prepared, found, until), *_after(prepared, terminal, onward, mitigation))
-    driven = _rounded(np.column_stack([states.x, states.y, states.orientation]))
+    driven = rounded(np.column_stack([states.x, states.y, states.orientation]))
     seen = np.concatenate([np.column_stack([lines[0].x, lines[0].y]), driven[:, :2]])
     # A figure is at least as high as a fifth of its width, and shows that much road.
     around = _AROUND + float(np.ptp(seen, axis=0).max())
     low, high = seen.min(axis=0) - around, seen.max(axis=0) + around
-    areas, edges = _road(scene.scenario.lanelet_network, low, high)
+    areas, edges = road_between(scene.scenario.lanelet_network, low, high)
     settings = prepared.config.scene
     return Drawing(
         start_s=round(float(scene.start[0, 0]), _DIGITS),
         s_offset=scene.vehicle.half_length if settings.s_offset is None else settings.s_offset,
         until=round(float(until), _DIGITS),
         steps=steps,
-        body=_rounded(scene.vehicle.corners),
+        body=rounded(scene.vehicle.corners),
         ego=driven,
         unrepaired=_unrepaired(prepared, found, moment),
         lines=lines,
         boxes=_boxes(prepared, max(float(line.t[-1]) for line in lines if len(line.t))),
-        bodies=tuple(
-            body
-            for obstacle in scene.obstacles
-            if (body := _body(obstacle, steps, end, low, high, found.conflict.obstacle_id)) is not None
-        ),
+        bodies=_bodies(scene.obstacles, steps, end, (low, high), found.conflict.obstacle_id),
         areas=areas,
         edges=edges,
     )
 
 
-def _rounded(values: Array) -> Array:
+def rounded(values: Array) -> Array:
+    """As it is written [m], [s]."""
     return frozen(np.round(values, _DIGITS) + 0.0)
 
 
@@ -110,7 +108,7 @@ def _line(prepared: Prepared, curve: Curve, t_rep: float | None, kind: str, name
     if t_rep is None:
         k &= path.t <= until + INSTANT
     columns = (path.t, *samples.position.T, *path.xy.T, path.speed, acceleration)
-    return Line(kind, name, t_rep, *(_rounded(column[k]) for column in columns))
+    return Line(kind, name, t_rep, *(rounded(column[k]) for column in columns))
 
 
 def _after(
@@ -133,7 +131,7 @@ def _after(
         samples = curve.sample(np.linspace(curve.t_start, end, count + 1))
         path = prepared.scene.frame.cartesian(samples)
         columns = (path.t, *samples.position.T, *path.xy.T, path.speed, np.gradient(path.speed, path.t))
-        lines.append(Line(kind, name, None, *(_rounded(column) for column in columns)))
+        lines.append(Line(kind, name, None, *(rounded(column) for column in columns)))
     return tuple(lines)
 
 
@@ -149,23 +147,23 @@ def _boxes(prepared: Prepared, t_end: float) -> tuple[Box, ...]:
     return tuple(
         Box(
             int(occupancy.ids[k]),
-            _rounded(t),
-            _rounded(np.where(in_the_way[k], lower[k, :, 0], np.nan)),
-            _rounded(np.where(in_the_way[k], upper[k, :, 0], np.nan)),
+            rounded(t),
+            rounded(np.where(in_the_way[k], lower[k, :, 0], np.nan)),
+            rounded(np.where(in_the_way[k], upper[k, :, 0], np.nan)),
         )
         for k in np.flatnonzero(in_the_way.any(axis=1))
     )
 
 
-def _road(network: object, low: Array, high: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+def road_between(network: object, low: Array, high: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Lanelets that meet a rectangle: their areas, and their bounds."""
     areas, edges = [], []
     for lanelet in network.lanelets:  # type: ignore[attr-defined]
         left, right = lanelet.left_vertices[:, :2], lanelet.right_vertices[:, :2]
         outline = np.vstack([left, right[::-1]])
         if (outline.max(axis=0) >= low).all() and (outline.min(axis=0) <= high).all():
-            areas.append(_rounded(outline))
-            edges += [_rounded(left), _rounded(right)]
+            areas.append(rounded(outline))
+            edges += [rounded(left), rounded(right)]
     return tuple(areas), tuple(edges)
 
 
@@ -178,26 +176,47 @@ def _outline(obstacle: Obstacle, step: int) -> Array | None:
     return points if len(points) else None
 
 
-def _body(
-    obstacle: Obstacle, steps: tuple[int, ...], end: int, low: Array, high: Array, opponent: int | None
+def _bodies(
+    obstacles: Sequence[Obstacle],
+    steps: tuple[int, ...],
+    end: int,
+    window: tuple[Array, Array],
+    opponent: int | None,
+) -> tuple[Body, ...]:
+    """Those who come into the picture at the conflict, and who is met at all times that are shown."""
+    made = (
+        body_of(one, steps, end, None) if one.id == opponent else body_of(one, steps[:1], end, window)
+        for one in obstacles
+    )
+    return tuple(body for body in made if body is not None)
+
+
+def body_of(
+    obstacle: Obstacle, steps: tuple[int, ...], end: int, window: tuple[Array, Array] | None
 ) -> Body | None:
-    """An obstacle that is shown; None for one that stays out of the picture."""
-    shown = {
-        step: _rounded(outline)
-        for step in steps
-        if (obstacle.id == opponent or step == steps[0]) and (outline := _outline(obstacle, step)) is not None
-    }
+    """An obstacle that is shown.
+
+    Parameters
+    ----------
+    obstacle : Obstacle
+    steps : tuple of int
+        At which its outline is kept, as far as it is there.
+    end : int
+        Its middle is kept until this step.
+    window : pair of (2,) arrays, or None
+        Lowest and highest x and y [m]: None is returned for who never comes into it.
+    """
+    shown = {step: rounded(outline) for step in steps if (outline := _outline(obstacle, step)) is not None}
     middles = np.full((end + 1, 2), np.nan)
     for step in range(end + 1):
         outline = _outline(obstacle, step)
         if outline is not None:
             middles[step] = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
     there = middles[np.isfinite(middles).all(axis=1)]
-    near = ((low < there) & (there < high)).all(axis=1).any()
-    if not near and obstacle.id != opponent:
+    if window is not None and not ((window[0] < there) & (there < window[1])).all(axis=1).any():
         return None
     moves = len(there) > 1 and np.ptp(there, axis=0).max() >= _STAYS
-    return Body(obstacle.id, obstacle.role, _rounded(middles if moves else middles[:1]), shown)
+    return Body(obstacle.id, obstacle.role, rounded(middles if moves else middles[:1]), shown)
 
 
 def _unrepaired(prepared: Prepared, found: SearchResult, moment: int) -> Array | None:
@@ -208,4 +227,4 @@ def _unrepaired(prepared: Prepared, found: SearchResult, moment: int) -> Array |
     driven = driven.every(prepared.checker.config.substeps)
     if moment >= len(driven):
         return None
-    return _rounded(np.array([driven.x[moment], driven.y[moment], driven.orientation[moment]]))
+    return rounded(np.array([driven.x[moment], driven.y[moment], driven.orientation[moment]]))

@@ -58,7 +58,7 @@ class _Drive:
     def cycle(self, eyes: Eyes) -> CycleRecord:
         """Ask the policy, and take what it says."""
         eyes.spent, eyes.complete = 0.0, True
-        sight = eyes.sight(self.curve, self.ego, self.step, planned=self.planned)
+        sight = eyes.sight(self.curve, self.ego, self.step, self.mode, planned=self.planned)
         ttc, f_ttr = float("inf"), None
         if self.mode == "plan":
             action = self._follow(sight)

@@ -19,7 +19,7 @@ from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.obstacle import Traffic
 from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.watch import Found, Looked, Watch
-from repair.simulate.world import Beliefs, widened
+from repair.simulate.world import Beliefs, displaced, widened
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["Eyes", "Grounds", "Sight", "driven_along"]
@@ -106,9 +106,11 @@ class Eyes:
         finally:
             self.spent += time.process_time() - begin
 
-    def sight(self, curve: Curve, ego: InitialState, step: int, *, planned: bool = False) -> Sight:
+    def sight(
+        self, curve: Curve, ego: InitialState, step: int, mode: str = "plan", *, planned: bool = False
+    ) -> Sight:
         """What is ahead of a curve that begins now; ``planned``: it is the plan as it was made."""
-        return Sight(self, curve, ego, step, planned)
+        return Sight(self, curve, ego, step, mode, planned)
 
 
 @dataclass(eq=False)
@@ -123,6 +125,8 @@ class Sight:
     ego : InitialState
     step : int
         Of the drive.
+    mode : str
+        What is driven: ``plan``, ``repair`` or ``brake``.
     planned : bool
         The plan as it was made.
     """
@@ -131,6 +135,7 @@ class Sight:
     curve: Curve
     ego: InitialState
     step: int
+    mode: str
     planned: bool
 
     @property
@@ -205,14 +210,32 @@ class Sight:
         """A repair that begins at once."""
         return self._search(self.eyes.hard, self.looked, (0.0,))
 
-    def gently(self, level: int) -> Found | None:
-        """The F-TTR with a smaller friction limit, among everybody widened; None without a conflict."""
+    def gently(self, level: int, *, at_once: bool = False) -> Found | None:
+        """The F-TTR with a smaller friction limit, among everybody widened; None without a conflict.
+
+        ``at_once``: a repair that begins now instead.
+        """
         grounds = self.eyes.grounds
         watch, traffic = self.eyes.gentle[level], self._traffic(grounds.config.simulate.error)
         looked = self.eyes.timed(lambda: watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now))
         if looked.conflict.time == float("inf"):
             return None
-        return self._search(watch, looked, None)
+        return self._search(watch, looked, (0.0,) if at_once else None)
+
+    def sure(self) -> bool:
+        """Whether the contact is there with everybody ahead of what is believed, and with everybody behind.
+
+        By how much, ``simulate.doubt`` says: that one of the two leaves the way free is reason to wait.
+        """
+        doubt = self.eyes.grounds.config.simulate.doubt
+        return doubt <= 0.0 or all(self._meets(error) for error in (doubt, -doubt))
+
+    def _meets(self, error: float) -> bool:
+        grounds, watch = self.eyes.grounds, self.eyes.hard
+        near = within_reach(grounds.beliefs.at(self.step), self._path)
+        traffic = Traffic(displaced(near, error, grounds.scene.dt), grounds.beliefs.ahead(self.step))
+        looked = self.eyes.timed(lambda: watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now))
+        return looked.conflict.contact_time < float("inf")
 
     def brakes(self, t: float) -> bool:
         """Whether full braking along the path helps that begins so much later [s]."""

@@ -8,19 +8,28 @@ import numpy as np
 
 from repair.arrays import Array, number, wrap
 from repair.simulate.data import Driven
+from repair.study.rows import Table
 
-__all__ = ["COLUMNS", "HARD", "row_of"]
+__all__ = ["SIMULATION", "row_of"]
 
-HARD = 4.0  # a deceleration from here on is a hard one [m/s²]
 
-#: What is stored of each drive, one column each.
-COLUMNS = (
-    "file", "plan", "shift_s", "prediction", "policy", "duration_s", "plan_contact_s",
-    "plan_contact_from_behind", "plan_margin", "contact_s", "contact_id", "contact_from_behind",
-    "impact_speed_mps", "ego_impact_speed_mps", "within_verified", "interventions", "first_intervention_s",
-    "braked_cycles", "peak_deceleration_mps2", "peak_jerk_mps3", "peak_lateral_acceleration_mps2",
-    "deviation_ms", "pairs", "jumps", "dissolved", "lost", "cycles", "cut_short", "cycle_p50_ms",
-    "cycle_max_ms",
+_COLUMNS: dict[str, type] = {
+    "duration_s": float, "plan_contact_s": float, "plan_contact_id": int,
+    "plan_contact_from_behind": bool, "plan_margin": bool,
+    "contact_s": float, "contact_id": int, "contact_from_behind": bool, "impact_speed_mps": float,
+    "ego_impact_speed_mps": float, "within_verified": bool, "interventions": int,
+    "first_intervention_s": float, "braked_cycles": int, "peak_deceleration_mps2": float,
+    "peak_jerk_mps3": float, "peak_lateral_acceleration_mps2": float, "deviation_ms": float, "pairs": int,
+    "jumps": int, "dissolved": int, "lost": int, "cycles": int, "cut_short": int, "cycle_p50_ms": float,
+    "cycle_max_ms": float,
+}  # fmt: skip
+#: What is stored of each drive; prediction, policy and shift are what varies.
+SIMULATION = Table(
+    "simulation", "`repair simulate --out`",
+    {
+        **dict.fromkeys(("file", "backend", "reference", "status", "detail"), str), **_COLUMNS,
+        "variation": str, "row_time_s": float, "worker_peak_memory_mb": float,
+    },
 )  # fmt: skip
 
 
@@ -39,7 +48,7 @@ def row_of(driven: Driven, never: Driven, clearance: float, period: float) -> di
     Returns
     -------
     dict
-        Those of :data:`COLUMNS` that the drives tell.
+        Those columns of :data:`SIMULATION` that the drives tell.
     """
     hit, planned = driven.struck, never.struck
     modes = [c.mode for c in driven.cycles]
@@ -48,6 +57,7 @@ def row_of(driven: Driven, never: Driven, clearance: float, period: float) -> di
     return {
         "duration_s": number(driven.states["t"][-1], 6),
         "plan_contact_s": None if planned is None else number(planned.time, 6),
+        "plan_contact_id": None if planned is None else planned.obstacle_id,
         "plan_contact_from_behind": None if planned is None else planned.from_behind,
         "plan_margin": planned is not None or never.distance < clearance,
         "contact_s": None if hit is None else number(hit.time, 6),

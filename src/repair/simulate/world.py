@@ -12,7 +12,7 @@ from repair.scene.road.lanes import Lane
 from repair.scene.traffic.obstacle import Obstacle
 from repair.simulate.predictions.base import Known, Predictor, cut
 
-__all__ = ["Beliefs", "World", "widened"]
+__all__ = ["Beliefs", "World", "displaced", "widened"]
 
 _STATED = frozenset(
     {"static", "environment", "phantom", "set_based"}
@@ -103,18 +103,36 @@ def widened(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple[O
     dt : float
         [s].
     """
-    made = list(obstacles)
-    for one in obstacles if error > 0.0 else ():
-        places = one.states[:, :2]
-        if one.role in _STATED or not np.isfinite(places).all():
-            continue
-        arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
-        if arc[-1] < _MOVES:
-            continue
-        off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
-        behind = np.maximum.accumulate(np.maximum(arc - off, 0.0)) - arc
-        made += [_along(one, off), _along(one, behind)]
-    return tuple(made)
+    if error <= 0.0:
+        return obstacles
+    both = (displaced(obstacles, by, dt) for by in (error, -error))
+    moved = (zip(obstacles, there, strict=True) for there in both)
+    return (*obstacles, *(two for pairs in moved for one, two in pairs if two is not one))
+
+
+def displaced(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple[Obstacle, ...]:
+    """Everybody, who moves ahead of where he is believed to be; behind with a negative error.
+
+    Parameters
+    ----------
+    obstacles : tuple of Obstacle
+    error : float
+        The distance is half of it times t² [m/s²]; nobody is believed to back up.
+    dt : float
+        [s].
+    """
+    return tuple(_displaced(one, error, dt) for one in obstacles)
+
+
+def _displaced(one: Obstacle, error: float, dt: float) -> Obstacle:
+    places = one.states[:, :2]
+    if one.role in _STATED or not np.isfinite(places).all():
+        return one
+    arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
+    if arc[-1] < _MOVES:
+        return one
+    off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
+    return _along(one, np.maximum.accumulate(np.maximum(arc + off, 0.0)) - arc)
 
 
 def _along(one: Obstacle, by: Array) -> Obstacle:

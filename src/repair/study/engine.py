@@ -247,6 +247,6 @@ def _answer(ended: _Busy) -> Answer:
 
 
 def _lost(task: Task, status: str, detail: str) -> Answer:
-    row = failed_row(task.file, task.backend, task.reference, status, detail)
+    row = failed_row(task.file, task.backend, task.reference, status, detail, task.table)
     row["variation"] = task.variation
-    return strict(row), None
+    return strict(row, task.table), None

@@ -13,8 +13,18 @@ from typing import Any
 
 from repair.config import Config, load_config
 from repair.errors import ConfigError, RepairError, ScenarioError, in_words
+from repair.study.rows import STUDY, Table
 
-__all__ = ["Study", "Task", "Variation", "labels_of", "package_version", "require_possible", "tasks_of"]
+__all__ = [
+    "Study",
+    "Task",
+    "Variation",
+    "checksum",
+    "labels_of",
+    "package_version",
+    "require_possible",
+    "tasks_of",
+]
 
 
 @dataclass(frozen=True)
@@ -99,6 +109,8 @@ class Task:
         See :class:`Study`.
     config_sha256 : str
         Of everything that is asked for: the resolved configuration, and which judges.
+    table : Table
+        What the row looks like.
     """
 
     file: str
@@ -115,6 +127,7 @@ class Task:
     timeout: float
     memory: float
     config_sha256: str
+    table: Table = STUDY
 
     @property
     def key(self) -> str:
@@ -163,13 +176,13 @@ def tasks_of(study: Study) -> list[Task]:
     """
     require_possible(study)
     configured = list(_configured(study))
-    files = [(name, path, _checksum(path)) for name, path in labels_of(study.files).items()]
+    files = [(name, path, checksum(path)) for name, path in labels_of(study.files).items()]
     return [
         Task(
-            name, str(path), checksum, config.backend, config.reference.source, variation.name, varied,
+            name, str(path), sha256, config.backend, config.reference.source, variation.name, varied,
             config, study.official, study.certify, study.results, study.timeout, study.memory, digest,
         )
-        for name, path, checksum in files
+        for name, path, sha256 in files
         for variation, config, varied, digest in configured
     ]  # fmt: skip
 
@@ -226,11 +239,18 @@ def _digest(config: Config, study: Study) -> str:
     """Checksum of the resolved configuration, the content of files that it names, and who judges."""
     asked: dict[str, Any] = {"official": study.official, "certify": study.certify, **config.to_dict()}
     if config.reference.file is not None:
-        asked["reference_sha256"] = _checksum(Path(config.reference.file))
+        asked["reference_sha256"] = checksum(Path(config.reference.file))
     return hashlib.sha256(json.dumps(asked, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _checksum(path: Path) -> str:
+def checksum(path: Path) -> str:
+    """Of a file.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read.
+    """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:

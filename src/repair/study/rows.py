@@ -9,8 +9,8 @@ from typing import Any
 from repair.errors import RepairError, in_words
 
 __all__ = [
-    "COLUMNS", "STUDY_COLUMNS", "SweepSettings", "as_sweep_row", "combinations", "failed_row", "one_line",
-    "strict", "type_of", "volatile",
+    "COLUMNS", "STUDY", "STUDY_COLUMNS", "SweepSettings", "Table", "as_sweep_row", "combinations",
+    "failed_row", "one_line", "strict", "type_of", "volatile",
 ]  # fmt: skip
 
 COLUMNS = (
@@ -51,13 +51,43 @@ def type_of(column: str) -> type:
     return float if column.endswith(_FIGURE) else str
 
 
+@dataclass(frozen=True)
+class Table:
+    """What is stored of each row.
+
+    Attributes
+    ----------
+    name : str
+        Of what is run: the file is called after it.
+    made_by : str
+        The commands that write it, in words.
+    columns : mapping
+        Names to types; ``file``, ``backend``, ``reference``, ``variation``, ``status``, ``detail``,
+        ``row_time_s`` and ``worker_peak_memory_mb`` are among them.
+    """
+
+    name: str
+    made_by: str
+    columns: Mapping[str, type]
+
+    @property
+    def stored_in(self) -> str:
+        """The name of the file."""
+        return f"{self.name}.sqlite"
+
+
+STUDY = Table(
+    "study", "`repair study` and `repair sweep`", {column: type_of(column) for column in STUDY_COLUMNS}
+)
+
+
 def volatile(column: str) -> bool:
     """Whether a column says how long something took, or how much memory: another one in each run."""
     return column.endswith(("_time_s", "_memory_mb"))
 
 
-def strict(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row with every column of a study, each of its type or None; no infinity.
+def strict(row: Mapping[str, Any], table: Table = STUDY) -> dict[str, Any]:
+    """A row with every column of its table, each of its type or None; no infinity.
 
     Raises
     ------
@@ -65,8 +95,8 @@ def strict(row: Mapping[str, Any]) -> dict[str, Any]:
         If a value is of another type: a defect of whoever made the row.
     """
     made: dict[str, Any] = {}
-    for column in STUDY_COLUMNS:
-        value, wanted = row.get(column), type_of(column)
+    for column, wanted in table.columns.items():
+        value = row.get(column)
         if wanted is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if value is not None and (type(value) is not wanted or value in (float("inf"), -float("inf"))):
@@ -122,9 +152,11 @@ def combinations(settings: SweepSettings) -> list[tuple[str, str]]:
     return [(backend, reference) for reference in settings.references for backend in settings.backends]
 
 
-def failed_row(file: str, backend: str, reference: str, status: str, detail: str) -> dict[str, Any]:
+def failed_row(
+    file: str, backend: str, reference: str, status: str, detail: str, table: Table = STUDY
+) -> dict[str, Any]:
     """The row of what could not be run, with the reason."""
-    row: dict[str, Any] = dict.fromkeys(STUDY_COLUMNS)
+    row: dict[str, Any] = dict.fromkeys(table.columns)
     row.update(file=file, backend=backend, reference=reference, status=status, detail=detail)
     return row
 

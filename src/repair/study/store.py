@@ -12,26 +12,25 @@ from typing import Any
 from repair.errors import OutputError, RepairError, in_words
 from repair.io.alone import Alone
 from repair.study.plan import Task, package_version
-from repair.study.rows import STUDY_COLUMNS, type_of
+from repair.study.rows import STUDY, Table
 
 __all__ = ["STORE_FILE", "Store"]
 
-STORE_FILE = "study.sqlite"
+STORE_FILE = STUDY.stored_in
 _SCHEMA = "1"
 _SQL = {bool: "INTEGER", int: "INTEGER", float: "REAL", str: "TEXT"}
 _PATIENCE = 30.0  # how long to wait for another process that writes [s]
 
 
-def _column(name: str) -> str:
+def _column(name: str, kind: type) -> str:
     """A column as it is declared: SQLite itself would take anything for anything."""
-    kind = type_of(name)
     held = {bool: f"{name} IN (0, 1)", str: f"typeof({name}) = 'text'"}.get(
         kind, f"typeof({name}) = '{_SQL[kind].lower()}'"
     )
     return f"{name} {_SQL[kind]} CHECK ({name} IS NULL OR {held})"
 
 
-_TABLES = f"""
+_TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE tasks (
     position INTEGER PRIMARY KEY, key TEXT NOT NULL, file TEXT NOT NULL, path TEXT NOT NULL,
@@ -40,18 +39,20 @@ CREATE TABLE tasks (
 );
 CREATE TABLE rows (
     key TEXT PRIMARY KEY, sha256 TEXT NOT NULL, config_sha256 TEXT NOT NULL, version TEXT NOT NULL,
-    {", ".join(_column(name) for name in STUDY_COLUMNS)}, result BLOB
+    {columns}, result BLOB
 );
 """
 
 
 class Store:
-    """The database of a study.
+    """The database of a study, or of what else is run as one.
 
     Parameters
     ----------
     folder : Path
-        It is made, and the file ``study.sqlite`` in it, if need be.
+        It is made, and the file in it, if need be.
+    table : Table
+        What its rows are.
     fresh : bool
         Begin anew: what is there is forgotten.
     readonly : bool
@@ -63,20 +64,21 @@ class Store:
         If it cannot be made or read, was made by a version with other columns, or another study writes there.
     """
 
-    def __init__(self, folder: Path, *, fresh: bool = False, readonly: bool = False) -> None:
-        self.path = folder / STORE_FILE
+    def __init__(
+        self, folder: Path, table: Table = STUDY, *, fresh: bool = False, readonly: bool = False
+    ) -> None:
+        self.path = folder / table.stored_in
+        self.table = table
         self.alone: Alone | None = None
         try:
             if not readonly:
                 folder.mkdir(parents=True, exist_ok=True)
-                self.alone = Alone(folder, "a study")
+                self.alone = Alone(folder, f"a {table.name}")
                 if fresh:
                     for end in ("", "-wal", "-shm"):
                         self.path.with_name(self.path.name + end).unlink(missing_ok=True)
             elif not self.path.is_file():
-                raise RepairError(
-                    f"{folder} holds no {STORE_FILE}; `repair study` and `repair sweep` write one"
-                )
+                raise RepairError(f"{folder} holds no {table.stored_in}; {table.made_by} write one")
             self._open(readonly)
         except BaseException as error:
             self._let_in()
@@ -99,17 +101,20 @@ class Store:
                 self.base.execute("PRAGMA synchronous=NORMAL")
             there = {row[0] for row in self.base.execute("SELECT name FROM sqlite_master WHERE type='table'")}
             if not there and not readonly:
-                self.base.executescript(f"BEGIN IMMEDIATE; {_TABLES} COMMIT;")
+                self.base.executescript(f"BEGIN IMMEDIATE; {self._tables()} COMMIT;")
                 self.tell(schema=_SCHEMA)
                 there = {"rows"}
             columns = {row[1] for row in self.base.execute("PRAGMA table_info(rows)")}
         except sqlite3.Error as error:
             raise RepairError(f"the store {self.path} cannot be used: {in_words(error)}") from error
-        if self.about().get("schema") != _SCHEMA or not columns >= set(STUDY_COLUMNS):
+        if self.about().get("schema") != _SCHEMA or not columns >= set(self.table.columns):
             raise RepairError(
                 f"the store {self.path} was made by a version of this program with other columns; "
                 "begin in another folder"
             )
+
+    def _tables(self) -> str:
+        return _TABLES.format(columns=", ".join(_column(*each) for each in self.table.columns.items()))
 
     def __enter__(self) -> Store:
         return self
@@ -157,9 +162,9 @@ class Store:
         OutputError
             With the reason of the operating system, or of SQLite.
         """
-        held = [_storable(row[name]) for name in STUDY_COLUMNS]
+        held = [_storable(row[name]) for name in self.table.columns]
         values = [task.key, task.sha256, task.config_sha256, package_version(), *held, whole]
-        names = ("key", "sha256", "config_sha256", "version", *STUDY_COLUMNS, "result")
+        names = ("key", "sha256", "config_sha256", "version", *self.table.columns, "result")
         try:
             self.base.execute(
                 f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})",
@@ -170,14 +175,14 @@ class Store:
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The rows of the study in its order, as far as they are there, with the settings that vary."""
-        named = ", ".join(f"rows.{name}" for name in STUDY_COLUMNS if name != "file")
+        named = ", ".join(f"rows.{name}" for name in self.table.columns if name != "file")
         named = f"tasks.file AS file, tasks.varied AS varied, {named}"
         query = f"SELECT {named} FROM tasks JOIN rows USING (key) ORDER BY position"
         for found in self.base.execute(query):
             row: dict[str, Any] = {}
-            for name in STUDY_COLUMNS:
+            for name, kind in self.table.columns.items():
                 value = found[name]
-                row[name] = bool(value) if value is not None and type_of(name) is bool else value
+                row[name] = bool(value) if value is not None and kind is bool else value
                 if name == "reference":
                     row.update(json.loads(found["varied"]))
             yield row

@@ -7,6 +7,7 @@ import json
 import tempfile
 import time
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from repair.preparation import Prepared
     from repair.scene.scene import Scene
 
-__all__ = ["Kept", "packed", "row_of", "run_file", "unpacked"]
+__all__ = ["Kept", "guarded", "packed", "row_of", "run_file", "unpacked"]
 
 _PREPARED = 4  # preparations of one scenario that are kept: of as many references, or other settings
 
@@ -118,23 +119,32 @@ def row_of(task: Task, kept: Kept) -> tuple[dict[str, Any], bytes | None]:
 
     Anything that is raised is a row that says so.
     """
-    begin = time.perf_counter()
     kept.turn_to(task)
+    return guarded(task, lambda: _row(task, kept))
+
+
+def guarded(
+    task: Task, make: Callable[[], tuple[dict[str, Any], bytes | None]]
+) -> tuple[dict[str, Any], bytes | None]:
+    """What is made of a task; anything that is raised is a row that says so."""
+    begin = time.perf_counter()
     whole: bytes | None = None
     try:
-        row, whole = _row(task, kept)
+        row, whole = make()
     except RepairError as error:
         # What a backend's own failure is reported as is no fault of the input.
         broken = isinstance(error, BackendError) and isinstance(error.__cause__, Exception)
-        row = failed_row(task.file, task.backend, task.reference, "crash" if broken else "input_error",
-                         one_line(error))  # fmt: skip
+        row = _failed(task, "crash" if broken else "input_error", one_line(error))
     except MemoryError:
-        row = failed_row(task.file, task.backend, task.reference, "memory", "there was no memory left")
+        row = _failed(task, "memory", "there was no memory left")
     except Exception as error:
-        detail = f"{type(error).__name__}: {one_line(error)}"
-        row = failed_row(task.file, task.backend, task.reference, "crash", detail)
+        row = _failed(task, "crash", f"{type(error).__name__}: {one_line(error)}")
     row.update(variation=task.variation, row_time_s=round(time.perf_counter() - begin, 4))
-    return strict(row), whole
+    return strict(row, task.table), whole
+
+
+def _failed(task: Task, status: str, detail: str) -> dict[str, Any]:
+    return failed_row(task.file, task.backend, task.reference, status, detail, task.table)
 
 
 def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:

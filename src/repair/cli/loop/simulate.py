@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from repair.cli.arguments import UsageError
 
 if TYPE_CHECKING:
     from repair.simulate.many.run import Simulation
-    from repair.simulate.many.store import Rows
 
 __all__ = ["simulate", "simulate_arguments"]
 
@@ -48,46 +47,61 @@ def simulate_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--out", metavar="DIR", type=Path,
-        help="store each drive as it comes, in simulation.jsonl; write simulation.csv, .json and report.html",
+        help="store each drive as it comes (simulation.sqlite); write simulation.csv, .json and report.html",
     )  # fmt: skip
+    parser.add_argument("--workers", metavar="N", type=int, help="processes on this machine (default: 1)")
     parser.add_argument("--resume", action="store_true", help="go on with the drives that are in --out DIR")
 
 
 def simulate(arguments: argparse.Namespace) -> int:
     """Every drive; prints the table."""
-    from repair.io.destination import require_folder
-    from repair.reference.registry import names
-    from repair.report.loop.table import table_of
-    from repair.simulate.many.run import simulate as run
-    from repair.simulate.many.shown import write_simulation
-    from repair.simulate.many.store import Rows
-
     if arguments.resume and arguments.out is None:
         raise UsageError("--resume goes on with what is stored in a folder; name it with --out")
+    if arguments.workers is not None and arguments.workers < 1:
+        raise UsageError(f"--workers is {arguments.workers}; at least one is needed")
+    from repair.io.destination import require_folder
+    from repair.reference.registry import names
+
     for name in arguments.reference or []:
         if name not in (known := names()):
             raise UsageError(f"reference {name!r} is none of {', '.join(known)}")
     if arguments.out is not None:
         require_folder(arguments.out)
-    rows = Rows(arguments.out)
-    if len(rows) and not arguments.resume:
-        raise UsageError(
-            f"{arguments.out} holds drives already; --resume goes on, --out names another folder"
-        )
     with ExitStack() as kept:
         what = _named(arguments, kept)
+        folder = arguments.out or Path(kept.enter_context(TemporaryDirectory(prefix="repair-")))
+        return _run(what, folder, arguments)
+
+
+def _run(what: Simulation, folder: Path, arguments: argparse.Namespace) -> int:
+    """Drive what is not there yet; everything that is goes into the table."""
+    from repair.report.loop.table import table_of
+    from repair.simulate.many.run import drives_in, tasks_of
+    from repair.simulate.many.shown import write_simulation
+    from repair.simulate.many.task import run_drive
+    from repair.simulate.measures import SIMULATION
+    from repair.study.engine import LocalLanes
+    from repair.study.run import run_study
+    from repair.study.store import Store
+
+    tasks = tasks_of(what)
+    with Store(folder, SIMULATION) as store:
+        if not arguments.resume and store.done():
+            raise UsageError(f"{folder} holds drives already; --resume goes on, --out names another folder")
+        store.tell(command=f"repair simulate {Path(arguments.what).name}")
         try:
-            _run(what, rows, run)
+            run_study(tasks, store, LocalLanes(arguments.workers or 1, run_drive))
         except KeyboardInterrupt:
             if arguments.out is None:
                 raise
-            print(
-                f"repair: interrupted; {len(rows)} drives are stored, and --resume goes on", file=sys.stderr
-            )
+            done = sum(task["done"] for task in store.tasks())
+            words = f"repair: interrupted; {done} of {len(tasks)} drives are stored in {store.path}"
+            print(f"{words}, and --resume goes on", file=sys.stderr)
             return 130
-    print(table_of(list(rows)))
+        drives = list(drives_in(store))
+    print(table_of(drives))
     if arguments.out is not None:
-        print(*write_simulation(rows, arguments.out), sep="\n")
+        print(*write_simulation(drives, folder), sep="\n")
     return 0
 
 
@@ -107,17 +121,3 @@ def _named(arguments: argparse.Namespace, kept: ExitStack) -> Simulation:
         files_of(path), tuple(arguments.policy or _POLICIES), tuple(arguments.prediction or _PREDICTIONS),
         tuple(arguments.reference or ("constant", "accelerate")), tuple(arguments.shift or (0.0,)), config,
     )  # fmt: skip
-
-
-def _run(what: Simulation, rows: Rows, run: Callable[..., None]) -> None:
-    """With a bar."""
-    from tqdm import tqdm
-
-    shown = sys.stderr is not None and sys.stderr.isatty()
-    with tqdm(unit="group", leave=False, disable=not shown) as bar:
-
-        def told(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-
-        run(what, rows, told=told)

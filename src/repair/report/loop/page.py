@@ -34,7 +34,7 @@ def simulation_page(rows: Sequence[Row]) -> str:
     cases: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
         if row["status"] == "driven":
-            key = row["file"], row["plan"], row["shift_s"], row["prediction"]
+            key = row["file"], row["reference"], row["shift_s"], row["prediction"]
             cases.setdefault(key, []).append(row)
     acting = {key: own for key, own in cases.items() if any(row["interventions"] for row in own)}
     chosen = sorted(acting.items(), key=lambda item: -_differ(item[1]))[:_DRAWN]

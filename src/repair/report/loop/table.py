@@ -103,10 +103,10 @@ def table_of(rows: Sequence[Row]) -> str:
     """The table in Markdown, cycle times and the F-TTR's flicker under it."""
     groups = groups_of(rows)
     left_out = [row for row in rows if row["status"] != "driven"]
-    cases = {(row["file"], row["plan"], row["shift_s"]) for row in rows if row["status"] == "driven"}
+    cases = {(row["file"], row["reference"], row["shift_s"]) for row in rows if row["status"] == "driven"}
     lines = [
         f"{len(cases)} cases of {len({c[0] for c in cases})} files, "
-        f"{len({(r['file'], r['plan'], r['shift_s']) for r in left_out})} left out",
+        f"{len({(r['file'], r['reference'], r['shift_s']) for r in left_out})} left out",
         "", f"| {' | '.join(_HEAD)} |", f"|{'---|' * len(_HEAD)}",
     ]  # fmt: skip
     for (prediction, policy), own in groups.items():

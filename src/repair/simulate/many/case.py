@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from repair.simulate.watch import Watch
 from repair.simulate.world import Beliefs, World
 from repair.timegrid import steps_until
 
-__all__ = ["Case", "Plan", "cases_of", "plan_on", "simulation_config"]
+__all__ = ["Case", "Plan", "case_at", "plan_on", "simulation_config"]
 
 _LEAST = 1.0  # a drive that is shorter says nothing [s]
 _GRID = 0.1  # the F-TTR is looked for on this grid, at least a step [s]
@@ -172,20 +171,17 @@ def plan_on(scene: Scene, config: Config) -> Plan:
     )
 
 
-def cases_of(plan: Plan, config: Config, shifts: tuple[float, ...]) -> Iterator[tuple[float, Case | str]]:
-    """The drives of a plan: each shift [s] with its case, or with why there is none."""
+def case_at(plan: Plan, config: Config, shift: float) -> Case | str:
+    """The plan among the traffic that begins so much later [s]; in words why it cannot be driven."""
     scene = plan.scene
+    by = round(shift / scene.dt)
+    n_steps = min(plan.n_steps, scene.n_steps - by)
+    if n_steps * scene.dt < _LEAST - 1e-9:
+        return f"there is less than {_LEAST:g} s to drive"
     lanes = lanes_of(scene.scenario.lanelet_network)[0]
-    for shift in shifts:
-        by = round(shift / scene.dt)
-        n_steps = min(plan.n_steps, scene.n_steps - by)
-        if n_steps * scene.dt < _LEAST - 1e-9:
-            yield shift, f"there is less than {_LEAST:g} s to drive"
-            continue
-        world = World(scene.obstacles, scene.dt, n_steps, by, lanes)
-        grounds = _grounds(plan, world, config, "constant_velocity")
-        never = drive(grounds, plan.prepared.reference, make_policy("never", config.simulate))
-        if never.struck is not None and never.struck.time <= 0.0:
-            yield shift, "somebody stands where it begins"
-            continue
-        yield shift, Case(plan, world, config, never)
+    world = World(scene.obstacles, scene.dt, n_steps, by, lanes)
+    grounds = _grounds(plan, world, config, "constant_velocity")
+    never = drive(grounds, plan.prepared.reference, make_policy("never", config.simulate))
+    if never.struck is not None and never.struck.time <= 0.0:
+        return "somebody stands where it begins"
+    return Case(plan, world, config, never)

@@ -1,28 +1,27 @@
-"""Many drives: files, plans, shifts, predictions and policies, resumable."""
+"""Many drives: files, plans, shifts, predictions and policies, as the tasks of a study."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from repair import __version__
 from repair.config.schema import Config
-from repair.errors import ConfigError, RepairError, ScenarioError, in_words
-from repair.scene.commonroad import load_scene
-from repair.scene.scene import Scene
-from repair.scene.settings import SceneConfig
-from repair.simulate.many.case import Case, cases_of, plan_on
-from repair.simulate.many.store import Rows
-from repair.simulate.measures import COLUMNS, row_of
-from repair.simulate.policies.registry import POLICIES, make_policy
-from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
+from repair.errors import ConfigError, ScenarioError, in_words
+from repair.simulate.measures import SIMULATION
+from repair.simulate.policies.registry import make_policy
+from repair.simulate.predictions.registry import make_predictor
+from repair.study.plan import Task, checksum, labels_of
+from repair.study.store import Store
+from repair.study.task import unpacked
 
-__all__ = ["Simulation", "files_of", "simulate"]
+__all__ = ["Simulation", "drives_in", "files_of", "tasks_of"]
+
+_TIMEOUT, _MEMORY = 900.0, 4000.0  # of one drive [s], [MB]
 
 
 @dataclass(frozen=True)
@@ -71,16 +70,14 @@ class Simulation:
 
     def _require_effect(self) -> None:
         """Refuse settings of policies and predictions that are not driven."""
-        owners = (("simulate.ttc", self.policies, "ttc"), ("simulate.gentle", self.policies, "graded"),
-                  ("simulate.error", self.policies, "graded"),
-                  ("simulate.delay", self.predictions, "delayed"))  # fmt: skip
-        for key, names, owner in owners:
-            own = {*POLICIES.names(), *PREDICTIONS.names()}
-            others = [name for name in names if name not in _OWN and name in own]
-            if key in self.config.given and owner not in names and not others:
-                raise ConfigError(f"{key} has no effect without {owner}")
+        driven = {*self.policies, *self.predictions}
+        for key, owner in _OWNERS.items():
+            if f"simulate.{key}" in self.config.given and owner not in driven and driven <= _OWN:
+                raise ConfigError(f"simulate.{key} has no effect without {owner}")
 
 
+#: Keys of the section that only one policy or prediction of ours reads; what others read nobody knows.
+_OWNERS = {"ttc": "ttc", "gentle": "graded", "error": "graded", "doubt": "graded", "delay": "delayed"}
 _OWN = frozenset({
     "f_ttr", "at_once", "ttc", "brake", "graded", "never",
     "recorded", "constant_velocity", "constant_turn", "lane", "delayed",
@@ -104,80 +101,51 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return found
 
 
-def simulate(
-    what: Simulation, rows: Rows, *, told: Callable[[int, int], None] = lambda done, total: None
-) -> None:
-    """Make the rows that are not there, one prediction after the other.
+def tasks_of(what: Simulation) -> list[Task]:
+    """Every drive, those of a file, a plan and a shift one after the other.
 
-    Parameters
-    ----------
-    what : Simulation
-    rows : Rows
-    told : callable
-        Called with the groups done and all: one for each file, plan and prediction.
+    Raises
+    ------
+    RepairError
+        If something that is named is not there, or a file cannot be read: before any work.
     """
     what.require()
-    groups = [(f, plan, p) for p in what.predictions for f in what.files for plan in what.plans]
-    told(0, len(groups))
-    for k, (file, plan, prediction) in enumerate(groups):
-        for key, row in _group(what, file, plan, prediction, rows):
-            rows.add(key, row)
-        told(k + 1, len(groups))
+    configs = {plan: _planned(what.config, plan) for plan in what.plans}
+    return [
+        Task(
+            file, str(path), sha256, what.config.backend, plan, f"{prediction}, {policy}, {shift:g} s later",
+            varied, configs[plan], False, False, True, _TIMEOUT, _MEMORY, _digest(configs[plan], varied),
+            SIMULATION,
+        )
+        for file, path in labels_of(what.files).items()
+        for sha256 in (checksum(path),)
+        for plan, shift, prediction, policy in product(
+            what.plans, what.shifts, what.predictions, what.policies
+        )
+        for varied in ({"shift_s": shift, "prediction": prediction, "policy": policy},)
+    ]  # fmt: skip
 
 
-def _group(
-    what: Simulation, file: Path, plan: str, prediction: str, rows: Rows
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The rows of a file, a plan and a prediction; what cannot be driven is a row that says so."""
-    config = replace(what.config, reference=replace(what.config.reference, source=plan))
-    config.given = what.config.given
-    known = _digest(file, plan, prediction, config)
-    wanted = {
-        (s, p): key for s in what.shifts for p in what.policies if (key := f"{known}/{s:g}/{p}") not in rows
-    }
-    if not wanted:
-        return
-    common = {"file": file.name, "plan": plan, "prediction": prediction}
-    try:
-        made = plan_on(_scene(file, _text(config)), config)
-        shifts = tuple(dict.fromkeys(s for s, _ in wanted))
-        for shift, case in cases_of(made, config, shifts):
-            for policy in (p for s, p in wanted if s == shift):
-                row = {**dict.fromkeys(COLUMNS), **common, "shift_s": shift, "policy": policy}
-                yield wanted[shift, policy], _driven(row, case)
-    except RepairError as error:
-        for (shift, policy), key in wanted.items():
-            row = {**dict.fromkeys(COLUMNS), **common, "shift_s": shift, "policy": policy}
-            yield key, {**row, "status": "not_driven", "detail": in_words(error)}
+def _planned(config: Config, plan: str) -> Config:
+    made = replace(config, reference=replace(config.reference, source=plan))
+    made.given = config.given
+    return made
 
 
-def _text(config: Config) -> str:
-    return json.dumps(asdict(config.scene), sort_keys=True, default=str)
+def _digest(config: Config, varied: dict[str, Any]) -> str:
+    """Checksum of everything that is asked for, the file apart, and what no part of the drive reads."""
+    asked = config.to_dict()
+    driven = {varied["policy"], varied["prediction"]}
+    for key, owner in _OWNERS.items():
+        if driven <= _OWN and owner not in driven:
+            del asked["simulate"][key]
+    text = json.dumps({**asked, "drive": varied}, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
-@lru_cache(maxsize=1)
-def _scene(file: Path, settings: str) -> Scene:
-    """The scene of a file, kept for its other plans."""
-    return load_scene(file, SceneConfig(**json.loads(settings)))
-
-
-def _driven(row: dict[str, Any], case: Case | str) -> dict[str, Any]:
-    if isinstance(case, str):
-        return {**row, "status": "not_driven", "detail": case}
-    prediction, policy = row["prediction"], row["policy"]
-    driven = case.never if policy == "never" else case.drive(prediction, policy)
-    period = case.grounds(prediction).period
-    clearance = case.config.checker.clearance
-    measured = row_of(driven, case.never, clearance, period)
-    return {**row, "status": "driven", "detail": "", **measured, "drive": driven.plain()}
-
-
-def _digest(file: Path, plan: str, prediction: str, config: Config) -> str:
-    """Checksum of everything that a row depends on."""
-    try:
-        content = hashlib.sha256(file.read_bytes()).hexdigest()
-    except OSError as error:
-        raise ScenarioError(f"{file} cannot be read: {error.strerror or in_words(error)}") from error
-    asked = json.dumps(config.to_dict(), sort_keys=True, default=str)
-    text = "\0".join((file.name, content, plan, prediction, asked, __version__))
-    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:24]
+def drives_in(store: Store) -> Iterator[dict[str, Any]]:
+    """The rows of a simulation, each with its ``drive``: states and cycles."""
+    positions = (task["position"] for task in store.tasks() if task["done"])
+    for position, row in zip(positions, store.rows(), strict=True):
+        whole = store.whole(position)
+        yield row if whole is None else {**row, "drive": unpacked(whole)["record"]}

@@ -26,12 +26,15 @@ class AtFttr(Releasing):
 
 
 @dataclass
-class Graded(Releasing):
+class Graded(AtFttr):
     """Wait on the F-TTR of a gentle repair, commit gently when that runs out, the hard one as a last resort.
 
     Gentle is a friction limit of ``simulate.gentle``, and to be clear of everybody being elsewhere by
     ``simulate.error``. Limits at which no repair is found are passed over, and not gone back to before the
-    conflict is over; after the last of them the policy is that of :class:`AtFttr`.
+    conflict is over; after the last of them the policy is that of :class:`AtFttr`. So it is while it is
+    doubtful whether there will be a contact at all (:meth:`repair.simulate.eyes.Sight.sure`).
+
+    Once off its plan it gains nothing by waiting: what it drives is repaired at once, as gently as can be.
 
     Attributes
     ----------
@@ -46,6 +49,8 @@ class Graded(Releasing):
 
     def decide(self, sight: Sight) -> Action:
         """Wait while a gentle repair is left for the next cycle."""
+        if sight.mode != "plan":
+            return self._again(sight)
         if sight.now > self.since + 1.5 * sight.period:
             self.level = 0
         self.since = sight.now
@@ -56,9 +61,19 @@ class Graded(Releasing):
             if lasts(found, sight.period):
                 return Action("keep", f_ttr=found.f_ttr)
             if found.curve is not None:
-                return repair_by(found)
+                if sight.sure():
+                    return repair_by(found)
+                break
             self.level += 1
-        found = sight.cycle
-        if lasts(found, sight.period):
-            return Action("keep", f_ttr=found.f_ttr)
-        return without(sight) if found.curve is None else repair_by(found)
+        return super().decide(sight)
+
+    def _again(self, sight: Sight) -> Action:
+        """Another repair, from now on."""
+        for level in range(len(sight.eyes.gentle)):
+            found = sight.gently(level, at_once=True)
+            if found is None:
+                return KEEP
+            if found.curve is not None:
+                return repair_by(found)
+        found = sight.first
+        return super().decide(sight) if found.curve is None else repair_by(found)
