@@ -13,31 +13,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import subprocess
 import sys
 import tempfile
 import warnings
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[2]
+from benchmarks.elsewhere import environment, told
+
 REQUIREMENTS = Path(__file__).with_name("requirements.txt")
-
-
-def environment(folder: Path) -> Path:
-    """The interpreter of CriMe's environment; the environment is built where it is not there yet."""
-    python = folder / "bin" / "python"
-    done = folder / "crime.txt"
-    if done.is_file() and done.read_text(encoding="utf-8") == REQUIREMENTS.read_text(encoding="utf-8"):
-        return python
-    print(f"building CriMe's environment in {folder}", file=sys.stderr)
-    subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-    # Everything that is needed stands in the file; what the packages ask for beyond it is not installed.
-    install = ["-m", "pip", "install", "-q", "--no-deps", "-r", str(REQUIREMENTS)]
-    subprocess.run([str(python), *install], check=True)
-    done.write_text(REQUIREMENTS.read_text(encoding="utf-8"), encoding="utf-8")
-    return python
 
 
 def ours(file: Path, backend: str, reference: str) -> dict[str, Any] | None:
@@ -120,14 +104,10 @@ def main() -> int:
     warnings.simplefilter("ignore")
     rows = collected(arguments.folder, arguments.files, arguments.backend, arguments.reference)
     with tempfile.TemporaryDirectory(prefix="repair-crime-") as aside:
-        python = environment((arguments.env or Path(aside) / "env").resolve())
+        python = environment((arguments.env or Path(aside) / "env").resolve(), REQUIREMENTS)
         handed = Path(aside) / "rows.json"
         handed.write_text(json.dumps(rows), encoding="utf-8")
-        done = subprocess.run(
-            [str(python), "-m", "benchmarks.crime.theirs", str(handed)], check=True, text=True, cwd=ROOT,
-            stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
-    theirs = [json.loads(line) for line in done.stdout.splitlines() if line.startswith('{"file"')]
+        theirs = told(python, "benchmarks.crime.theirs", str(handed))
     print(table(rows, theirs))
     return 0
 

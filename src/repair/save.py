@@ -20,6 +20,9 @@ from repair.io.commonroad import (
 )
 from repair.io.files import write_files
 from repair.io.result_json import DRAWING_FILE, RESULT_FILE, drawing_bytes, to_json
+from repair.io.trace.considered import Considered
+from repair.io.trace.planning import trace_bytes
+from repair.io.trace.verdict import verdict_bytes
 from repair.mitigation.mitigate import Mitigation
 from repair.outcome.data import Outcome
 from repair.registry import Registry, loaded
@@ -53,6 +56,8 @@ class Saved:
         From when on it is proven too late, by kind.
     mitigation : Mitigation or None
         The motion that hits least hard, where nothing was found.
+    considered : tuple of Considered or None
+        The trajectories that were looked at, where a planning trace of them is wanted.
     """
 
     outcome: Outcome
@@ -62,6 +67,7 @@ class Saved:
     figures: bool | FigureStyle
     bounds: Mapping[str, Bound] = field(default_factory=dict)
     mitigation: Mitigation | None = None
+    considered: tuple[Considered, ...] | None = None
 
     @property
     def name(self) -> str:
@@ -93,13 +99,21 @@ Format = Callable[[Saved], Files]
 
 def solution_file(result: Saved) -> Files:
     """The driven trajectory as a CommonRoad solution, where there is a verified one."""
-    name = f"solution_{result.name}.xml"
-    if no_solution_because(result.scene, result.status):
+    name, content = f"solution_{result.name}.xml", _solution(result)
+    if content is None:
         return Files({}, {"solution_file": None}, (name,))
+    return Files({name: content}, {"solution_file": name})
+
+
+def _solution(result: Saved) -> bytes | None:
+    """The content of the solution file; None where there is no verified trajectory."""
+    if no_solution_because(result.scene, result.status):
+        return None
     from commonroad.common.solution import CommonRoadSolutionWriter
 
     solution = to_solution(result.scene, result.states, result.status)
-    return Files({name: CommonRoadSolutionWriter(solution).dump().encode()}, {"solution_file": name})
+    written: str = CommonRoadSolutionWriter(solution).dump()
+    return written.encode()
 
 
 def mitigation_file(result: Saved) -> Files:
@@ -175,6 +189,36 @@ def scenario_file(result: Saved) -> Files:
     )
 
 
+def trace_files(result: Saved) -> Files:
+    """What was planned, and the verdict on it, for drawtonomy; where a trace is wanted.
+
+    Without a verified trajectory there is no solution, and so no verdict on one.
+    """
+    stem = f"solution_{result.name}"
+    traced, judged = f"{stem}.planning-trace.json", f"{stem}.verdict.json"
+    if result.considered is None:
+        return Files({}, {}, (traced, judged))
+    scenario, solution = _scenario(result.scene), _solution(result)
+    record, scene = result.outcome.record, result.scene
+    files = {traced: trace_bytes(record, scene, result.states, result.considered, scenario, solution)}
+    if scenario is not None and solution is not None:
+        files[judged] = verdict_bytes(scenario, solution)
+    return Files(
+        files, {"trace_file": traced, "verdict_file": judged if judged in files else None}, (traced, judged)
+    )
+
+
+def _scenario(scene: Scene) -> bytes | None:
+    """The scenario's file as it was read, or as it is written beside the result; None where it is no more."""
+    if scene.path is None:
+        try:
+            return scenario_bytes(scene)
+        except OutputError:
+            return None
+    content = scene.path.read_bytes() if scene.path.is_file() else b""
+    return content if hashlib.sha256(content).hexdigest() == scene.sha256 else None
+
+
 def proof_file(result: Saved) -> Files:
     """The proofs of the bounds, where there are any."""
     said = result.outcome.record.get("bound")
@@ -193,6 +237,7 @@ FORMATS: Registry[Format] = Registry(
         "scenario": scenario_file,
         "drawing": drawing_file,
         "proof": proof_file,
+        "trace": trace_files,
     },
     error=OutputError,
     group="repair.formats",

@@ -566,7 +566,8 @@ def test_a_result_of_an_earlier_version_is_certified(copied: Path) -> None:
 
 
 def test_every_format_names_its_files(found: RepairResult, tmp_path: Path) -> None:
-    assert FORMATS.names() == ("solution", "mitigation", "figures", "report", "scenario", "drawing", "proof")
+    own = ("solution", "mitigation", "figures", "report", "scenario", "drawing", "proof", "trace")
+    assert FORMATS.names() == own
 
     def text(result: Any) -> Files:
         return Files({f"{result.name}.txt": b"mine"}, {"text_file": f"{result.name}.txt"}, ("old.txt",))

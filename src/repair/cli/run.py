@@ -63,6 +63,9 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to-goal", action="store_true", help="go on until the planning problem's goal is reached"
     )
+    parser.add_argument(
+        "--trace", action="store_true", help="with --out: also drawtonomy's planning trace and verdict"
+    )
     parser.add_argument("--no-figure", action="store_true", help="leave the figures and the page out")
     figure_arguments(parser)
 
@@ -177,6 +180,8 @@ def run(arguments: argparse.Namespace) -> int:
         require_folder(arguments.out)
     if style is not None and (arguments.out is None or arguments.no_figure):
         raise UsageError("--format, --width and --font-size say how figures are written; they need --out DIR")
+    if arguments.trace and arguments.out is None:
+        raise UsageError("--trace writes files; it needs --out DIR")
     with _Interrupts() as interrupts, _scenario(arguments) as (path, config, given):
         from repair.api import repair
         from repair.io.result_json import to_json
@@ -188,7 +193,8 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out is not None:
             interrupts.ignored = 1.0
             try:
-                outcome, written = result.saved(arguments.out, figure=style or not arguments.no_figure)
+                figure = style or not arguments.no_figure
+                outcome, written = result.saved(arguments.out, figure=figure, trace=arguments.trace)
                 content = outcome.record
             except RepairError as error:
                 problem = error

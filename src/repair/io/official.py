@@ -7,14 +7,15 @@ sweeps and certificates do.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from repair.errors import in_words
 from repair.io.plotting import import_matplotlib
 from repair.scene.road.sections import endless
 
@@ -51,6 +52,8 @@ class OfficialVerdict:
         ``goal_reached``: some state fulfils a goal state.
     egos_apart : bool
         ``ego_collision`` raised nothing.
+    words : mapping
+        What the checker raised, by the name of the question above: its type and its words.
     """
 
     feasible: bool
@@ -63,6 +66,7 @@ class OfficialVerdict:
     starts: bool = True
     goal: bool = True
     egos_apart: bool = True
+    words: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def ok(self) -> bool:
@@ -113,28 +117,32 @@ def check_solution_file(file: Path, scenario: Any, planning_problems: Any) -> Of
             VehicleDynamics.from_model(part.vehicle_model, part.vehicle_type)
         return all(part.trajectory_type.name == part.vehicle_model.name for part in parts)
 
-    try:
-        official.obstacle_collision(*everything)
-        collision_free = True
-    except official.CollisionException:
-        collision_free = False
+    words: dict[str, str] = {}
+    ask = partial(_said, words)
     on_road, method = _on_road(solution, scenario, planning_problems)
     return OfficialVerdict(
-        _said(feasible), collision_free, on_road, method,
-        solved=_said(lambda: official.solved_all_problems(planning_problems, solution)),
-        vehicle_model=_said(known),
-        connected=all(_said(partial(_connected, part.trajectory.state_list, scenario.dt)) for part in parts),
-        starts=_said(lambda: official.starts_at_correct_state(solution, planning_problems)),
-        goal=_said(lambda: official.goal_reached(*everything)),
-        egos_apart=_said(lambda: not official.ego_collision(*everything)),
-    )  # fmt: skip
+        feasible=ask("feasible", feasible),
+        collision_free=ask("collision_free", lambda: not official.obstacle_collision(*everything)),
+        on_road=on_road,
+        road_method=method,
+        solved=ask("solved", lambda: official.solved_all_problems(planning_problems, solution)),
+        vehicle_model=ask("vehicle_model", known),
+        connected=all(
+            ask("connected", partial(_connected, part.trajectory.state_list, scenario.dt)) for part in parts
+        ),
+        starts=ask("starts", lambda: official.starts_at_correct_state(solution, planning_problems)),
+        goal=ask("goal", lambda: official.goal_reached(*everything)),
+        egos_apart=ask("egos_apart", lambda: not official.ego_collision(*everything)),
+        words=words,
+    )
 
 
-def _said(question: Callable[[], Any]) -> bool:
+def _said(words: dict[str, str], name: str, question: Callable[[], Any]) -> bool:
     """What the checker answers; where it raises, to say no or because it cannot judge, that is a no."""
     try:
         return bool(question())
-    except Exception:
+    except Exception as error:
+        words[name] = f"{type(error).__name__}: {in_words(error)}"
         return False
 
 
