@@ -82,16 +82,16 @@ def official_check(
     """
     if _OFFICIAL not in sys.modules:
         in_time(_IMPORT, "importing the drivability checker")
-    from commonroad.common.solution import VehicleType
     from commonroad_dc.feasibility.feasibility_checker import (
         position_orientation_objective,
         state_transition_feasibility,
     )
-    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+
+    from repair.vehicle.ks_dynamics import quick_dynamics
 
     asked = np.arange(len(states) - 1) if transitions is None else np.array(list(transitions), dtype=np.intp)
     ks = to_ks_states(states, 0)
-    dynamics = VehicleDynamics.KS(VehicleType(vehicle.type_id))
+    dynamics = quick_dynamics(vehicle.type_id)
     reasons: dict[int, str] = {}
 
     def timed(*values: Any) -> float:

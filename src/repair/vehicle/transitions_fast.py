@@ -15,10 +15,10 @@ import numpy as np
 from repair.arrays import Array
 from repair.vehicle.transitions import (
     ACCEPTED,
-    ENGINE,
     ORIENTATION_TOLERANCE,
     POSITION_TOLERANCE,
     STEERING_RATE,
+    engine_share,
 )
 
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def clearly_drivable(
     engine = acceleration * vehicle.a_max
     # As Vehicle.engine_acceleration has it, on plain numbers.
     if fastest > vehicle.v_switch:
-        engine = ENGINE * vehicle.a_max * vehicle.v_switch / fastest
+        least = vehicle.a_max * vehicle.v_switch / fastest
+        engine = least * float(engine_share(np.array(least), dt))
     to_steering = vehicle.wheelbase / vehicle.rear  # from the slip angle's tangent; atan has slope <= 1
     if not (
         steepest * to_steering <= math.tan(_SURE * steering * vehicle.steering_max)
