@@ -29,16 +29,7 @@ def environment(folder: Path, requirements: Path) -> Path:
         return python
     print(f"building an environment in {folder}", file=sys.stderr)
     subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], check=True, env=_clean())
-    install = [
-        "-m",
-        "pip",
-        "install",
-        "-q",
-        "--disable-pip-version-check",
-        "--no-deps",
-        "-r",
-        str(requirements),
-    ]
+    install = ["-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-deps", "-r"]
     subprocess.run([str(python), *install, str(requirements)], check=True, env=_clean())
     done.write_text(wanted, encoding="utf-8")
     return python
