@@ -239,6 +239,17 @@ def test_a_quick_answer_is_never_earlier_than_the_bound_and_stays(tmp_path):
     assert quick(late + 0.05)
 
 
+def test_the_quick_answers_of_a_grid_are_no_earlier_than_the_bound_and_those_of_one_time(tmp_path):
+    situation = prepared(tmp_path, wall())
+    late, times = repair.bound(situation)["search"].time, np.arange(0.1, situation.conflict.time, 0.1)
+    quick = Quick(situation)
+    since = quick.since(times)
+    assert late - 0.1 < since < situation.conflict.time
+    assert since in times
+    assert all(quick(t) for t in times[times >= since])
+    assert Quick(situation).since([]) == Quick(situation).since(times[:2]) == np.inf
+
+
 def test_a_quick_answer_is_no_where_no_limit_is_claimed_and_after_the_conflict(tmp_path):
     situation = prepared(tmp_path, wall())
     assert Quick(situation)(situation.conflict.time - 0.1)

@@ -212,26 +212,24 @@ class Slow:
         return SolveResult(SolveStatus.SOLVED, curve=curve, objective=1.0)
 
 
-def searched(backend, after=None, **keys):
+class TooLate:
+    """Proves it from a time on, and says where it was asked."""
+
+    def __init__(self, since):
+        self.first, self.asked = since, []
+
+    def __call__(self, t_rep):
+        self.asked.append(round(t_rep, 6))
+        return t_rep > self.first
+
+    def since(self, times):
+        return min((t for t in times if self(t)), default=np.inf)
+
+
+def searched(backend, **keys):
     settings = SearchConfig(delta_t=0.4, rule="scan", **keys)
-    return search_f_ttr(
-        Source(), Conflict(2.9, "margin", 7, 2.95), backend, Until(1.6), settings,
-        after=after, hopeless=lambda t_rep: t_rep > 1.9,
-    )  # fmt: skip
-
-
-def test_after_a_repair_nobody_is_asked_at_a_time_that_is_proven_to_be_too_late():
-    slow = Slow()
-    first = searched(slow).probes[1]
-    assert slow.asked == [0.0, 0.4, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8]  # by itself it is not held up by proofs
-    slow.asked.clear()
-    found = searched(slow, after=first)
-    assert found.f_ttr == pytest.approx(1.6)
-    assert slow.asked == [0.8, 1.2, 1.6]
-    assert [p.t_rep for p in found.probes if not p.feasible] == pytest.approx([2.0, 2.4, 2.8])
-    slow.asked.clear()
-    searched(slow, after=first, proofs=False)
-    assert slow.asked[-1] == 2.8
+    conflict = Conflict(2.9, "margin", 7, 2.95)
+    return search_f_ttr(Source(), conflict, backend, Until(1.6), settings, hopeless=TooLate(1.9))
 
 
 def test_a_hard_backend_asks_no_helper_at_a_time_that_is_proven_to_be_too_late():

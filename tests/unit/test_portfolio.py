@@ -58,7 +58,21 @@ class Checker:
         return Verdict()
 
 
-def asked(*members, rule="bisect", ttc=2.0, too_late=None, visits=None, **keys):
+class TooLate:
+    """Proves it from a time on, and says where it was asked."""
+
+    def __init__(self, first):
+        self.first, self.asked = first, []
+
+    def __call__(self, t_rep):
+        self.asked.append(round(t_rep, 6))
+        return t_rep >= self.first
+
+    def since(self, times):
+        return min((t for t in times if self(t)), default=float("inf"))
+
+
+def asked(*members, rule="bisect", ttc=2.0, too_late=None, hopeless=None, visits=None, **keys):
     """The search with these members among a conflict at ``ttc``."""
     source = Source()
     situation = SimpleNamespace(
@@ -67,7 +81,9 @@ def asked(*members, rule="bisect", ttc=2.0, too_late=None, visits=None, **keys):
     named = {member.name: member for member in members}
     whole = SimpleNamespace(capabilities=Capabilities(members=lambda: named))
     settings = SearchConfig(rule=rule, delta_t=STEP, **keys)
-    found = search_with(whole, "portfolio", situation, settings, too_late=too_late, visits=visits)
+    found = search_with(
+        whole, "portfolio", situation, settings, too_late=too_late, hopeless=hopeless, visits=visits
+    )
     return found, capabilities_of(whole, found)
 
 
@@ -118,6 +134,25 @@ def test_nobody_is_asked_for_what_is_proven_too_late():
     assert max(second.asked) < 1.0
     assert third.asked == []
     assert len(calls) == 1
+
+
+def test_nobody_is_asked_where_a_quick_proof_says_too_late():
+    proof, second, third = TooLate(1.0), Member("second", 9.0), Member("third", 9.0)
+    found, _ = asked(Member("first", 0.5), second, third, hopeless=proof)
+    assert found.f_ttr == pytest.approx(0.9)
+    assert max(second.asked) < 1.0
+    assert third.asked == []
+    assert min(proof.asked) > 0.55, "a proof was looked for where a repair is known"
+    second.asked.clear()
+    asked(Member("first", 0.5), second, hopeless=proof, proofs=False)
+    assert max(second.asked) > 1.0
+
+
+def test_given_visits_that_are_proven_too_late_are_left_out():
+    proof, second = TooLate(0.9), Member("second", 1.1)
+    asked(Member("first", 0.4), second, hopeless=proof, visits=(0.2, 0.4, 0.6, 1.0))
+    assert second.asked == [0.6]
+    assert proof.asked == [0.6, 1.0]
 
 
 def test_who_can_starts_from_the_repair_before():

@@ -18,6 +18,7 @@ from repair.search.result import Probe
 
 __all__ = [
     "Budget",
+    "Hopeless",
     "ProblemSource",
     "Rejected",
     "TrajectoryChecker",
@@ -71,6 +72,18 @@ class TrajectoryChecker(Protocol):
         ...
 
 
+class Hopeless(Protocol):
+    """Says where it is proven that nothing is feasible; an answer of no says nothing."""
+
+    def __call__(self, t_rep: float) -> bool:
+        """Whether it is proven for a t_rep [s], and then for all later ones."""
+        ...
+
+    def since(self, times: Sequence[float]) -> float:
+        """From which of some ascending times [s] on it is proven; infinite where it is for none."""
+        ...
+
+
 @dataclass
 class Budget:
     """What is left of a time limit, and what is not worth spending it on."""
@@ -79,7 +92,7 @@ class Budget:
     begin: float
     clock: Callable[[], float]
     # whether it is proven that nothing is feasible at a t_rep
-    hopeless: Callable[[float], bool] | None = None
+    hopeless: Hopeless | None = None
     cut: bool = False  # the last probe would have gone on, had there been time
 
     @property

@@ -19,7 +19,15 @@ from repair.curves.base import Curve
 from repair.deadline import OutOfTime
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import other_ways, probe_again, too_close
-from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides, words
+from repair.search.probe import (
+    Budget,
+    Hopeless,
+    ProblemSource,
+    TrajectoryChecker,
+    probe_one,
+    probe_sides,
+    words,
+)
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import IsOpen, Order, probe_order
 from repair.search.settings import SearchConfig
@@ -41,7 +49,7 @@ def iter_probes(
     clock: Callable[[], float] = time.perf_counter,
     visits: Sequence[float] | None = None,
     after: Probe | None = None,
-    hopeless: Callable[[float], bool] | None = None,
+    hopeless: Hopeless | None = None,
 ) -> Iterator[Probe]:
     """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
 
@@ -53,7 +61,7 @@ def iter_probes(
         The t_rep to visit [s] instead, whatever comes out.
     after : Probe, optional
         A feasible one: later t_rep are visited only, and its curve is where to start from.
-    hopeless : callable, optional
+    hopeless : Hopeless, optional
         Says of a t_rep whether it is proven that nothing is feasible there.
     """
     budget = Budget(settings.time_limit, clock(), clock, hopeless if settings.proofs else None)
@@ -83,9 +91,7 @@ def iter_probes(
         if budget.spent:
             raise OutOfTime
         with budget.watched():
-            # After a repair most of what is left is too late: who takes long and knows no sides asks first.
-            late = after is not None and backend.capabilities.own_way and _hopeless(t_rep, budget)
-            first = () if late else made.pop(t_rep) if t_rep in made else source.at(t_rep)
+            first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
             probe = _visit(t_rep, first, source, backend, checker, settings.sides, warm_start, budget)
         if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
@@ -271,7 +277,7 @@ def search_f_ttr(
     visits: Sequence[float] | None = None,
     on_probe: Callable[[Probe], None] | None = None,
     after: Probe | None = None,
-    hopeless: Callable[[float], bool] | None = None,
+    hopeless: Hopeless | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
     """Algorithm 1 of the paper.
@@ -291,7 +297,7 @@ def search_f_ttr(
         Called after every probe; an interrupt in between loses nothing that was found.
     after : Probe, optional
         A feasible one: only later t_rep are visited, and its curve is where to start from.
-    hopeless : callable, optional
+    hopeless : Hopeless, optional
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     clock : callable
         Monotonic time [s]; a parameter so that tests can bend it.

@@ -14,13 +14,14 @@ from functools import partial
 from repair.backend.base import Capabilities, RepairBackend, SolveResult, SolveStatus
 from repair.backend.guard import Guarded
 from repair.curves.base import Curve
+from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
-from repair.search.probe import ProblemSource
+from repair.search.probe import Hopeless, ProblemSource
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
 from repair.situation import Situation
-from repair.timegrid import INSTANT
+from repair.timegrid import INSTANT, intervals
 
 __all__ = ["capabilities_of", "search_with"]
 
@@ -34,7 +35,7 @@ def search_with(
     around: ProblemSource | None = None,
     visits: Sequence[float] | None = None,
     too_late: Callable[[], float] | None = None,
-    hopeless: Callable[[float], bool] | None = None,
+    hopeless: Hopeless | None = None,
     on_probe: Callable[[Probe], None] | None = None,
 ) -> SearchResult:
     """Algorithm 1 with a backend, or with each member of one that is made of several.
@@ -57,7 +58,7 @@ def search_with(
         The times-to-repair to try [s].
     too_late : callable, optional
         From when on nobody finds anything [s]; asked once, when there is a repair and a member left.
-    hopeless : callable, optional
+    hopeless : Hopeless, optional
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     on_probe : callable, optional
         Called after every probe.
@@ -144,7 +145,7 @@ def _search_with(
     around: ProblemSource | None,
     visits: Sequence[float] | None,
     too_late: Callable[[], float] | None,
-    hopeless: Callable[[float], bool] | None,
+    hopeless: Hopeless | None,
     on_probe: Callable[[Probe], None] | None,
 ) -> SearchResult:
     """As :func:`search_with`, without fallbacks."""
@@ -173,11 +174,13 @@ def _search_with(
         if best is not None:
             if late is not None and _open(visits, best, settings, end):
                 end, late = min(end, late()), None
+            left = _left(settings, begin)
+            if hopeless is not None and settings.proofs and _open(visits, best, settings, end):
+                end = min(end, _since(hopeless, _later(visits, best, settings, end), left))
             if not _open(visits, best, settings, end):
                 break
-            visits = None if visits is None else [t for t in visits if t > best.t_rep + INSTANT]
-        spent = time.perf_counter() - begin
-        limit = None if settings.time_limit is None else max(settings.time_limit - spent, 0.0)
+            visits = None if visits is None else _later(visits, best, settings, end)
+        limit = _left(settings, begin)
         upper = end if settings.upper is None else min(end, settings.upper)
         now = replace(settings, time_limit=limit, upper=upper if math.isfinite(upper) else None)
         found = ask(each, member, now, best)
@@ -197,12 +200,36 @@ def _search_with(
     )
 
 
-def _open(visits: Sequence[float] | None, best: Probe, settings: SearchConfig, end: float) -> bool:
-    """Whether there is a time-to-repair later than the best before ``end`` [s]."""
+def _left(settings: SearchConfig, begin: float) -> float | None:
+    """What is left of the time limit of a search [s]; None where it has none."""
+    if settings.time_limit is None:
+        return None
+    return max(settings.time_limit - (time.perf_counter() - begin), 0.0)
+
+
+def _since(hopeless: Hopeless, times: Sequence[float], left: float | None) -> float:
+    """From when on it is proven to be too late [s]; infinite where the time is up before that is known."""
+    try:
+        with until(None if left is None else time.perf_counter() + left):
+            return hopeless.since(times)
+    except OutOfTime:
+        return math.inf
+
+
+def _later(
+    visits: Sequence[float] | None, best: Probe, settings: SearchConfig, end: float
+) -> Sequence[float]:
+    """The times-to-repair after the best that could be visited before ``end`` [s]."""
     end = end if settings.upper is None else min(end, settings.upper)
     if visits is not None:
-        return any(best.t_rep + INSTANT < t < end - INSTANT for t in visits)
-    return best.t_rep + settings.delta_t < end - INSTANT
+        return sorted(t for t in visits if best.t_rep + INSTANT < t < end - INSTANT)
+    size = intervals(end - best.t_rep, settings.delta_t)
+    return [best.t_rep + k * settings.delta_t for k in range(1, size)]
+
+
+def _open(visits: Sequence[float] | None, best: Probe, settings: SearchConfig, end: float) -> bool:
+    """Whether there is a time-to-repair later than the best before ``end`` [s]."""
+    return bool(_later(visits, best, settings, end))
 
 
 def capabilities_of(backend: RepairBackend, found: SearchResult) -> Capabilities:
