@@ -13,7 +13,7 @@ from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import obstacles_of
 from repair.vehicle.parameters import load_vehicle
 from repair.world.collision import CollisionWorld
-from repair.world.polygons import polygon_gap
+from repair.world.polygons import polygons_left
 from repair.world.road import RoadBoundary
 from repair.world.touching import rectangles_touch
 
@@ -76,6 +76,14 @@ def test_rectangles_as_in_pycrcc():
     assert (ours == theirs).all()
 
 
+def left_of(parts, x, y, heading, moved=0j):
+    """What is left of the gap between polygons and the ego at a pose."""
+    left, reach = polygons_left(parts)
+    assert reach == pytest.approx(max(np.hypot(*part.T).max() for part in parts))
+    own = complex(np.cos(heading), -np.sin(heading))
+    return left(-complex(x, y) * own, moved, own, 0j, complex(*HALF))
+
+
 def test_polygons_as_in_shapely():
     import shapely
 
@@ -89,8 +97,11 @@ def test_polygons_as_in_shapely():
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * HALF @ np.array([[c, s], [-s, c]]) + (x, y)
         answers.append(shapely.Polygon(corners).intersects(shapely.Polygon(polygon)))
         for ring in (polygon[:-1], polygon[:-1][::-1]):
-            gap, _ = polygon_gap((ring @ [1.0, 1j] - complex(x, y)) * complex(c, -s), complex(*HALF), 0.0)
+            gap = left_of((ring,), x, y, heading)
             assert (gap <= 0.0) == answers[-1]
+            far = ring + np.array([40.0, 0.0])
+            assert left_of((far, ring, np.vstack([far, far[-1:]])), x, y, heading) == pytest.approx(gap)
+            assert left_of((ring,), x, y, heading, moved=0.5 + 0.0j) <= gap
     assert 0.2 < np.mean(answers) < 0.8
 
 

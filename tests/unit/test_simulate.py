@@ -392,11 +392,10 @@ class Seen:
     def __init__(self, gentle, hard=LATER, *, sure=True, mode="plan", now=0.0, first=None):
         self.eyes = SimpleNamespace(gentle=gentle)
         self.found, self.cycle, self.first = gentle, made(hard, "hard"), made(first, "first")
-        self.mode, self.now, self.asked = mode, now, []
+        self.mode, self.now = mode, now
         self.sure = lambda: sure
 
-    def gently(self, level, *, at_once=False):
-        self.asked.append((level, at_once))
+    def gently(self, level):
         return made(self.found[level], level)
 
 
@@ -418,12 +417,9 @@ def test_a_gentle_repair_is_waited_on_and_driven_where_the_contact_is_sure():
 
 def test_off_the_plan_nothing_is_waited_for():
     policy = make_policy("graded", SimulateConfig())
-    sight = Seen((None, 0.0), mode="repair", sure=False)
-    assert policy.decide(sight).curve == 1
-    assert sight.asked == [(0, True), (1, True)]
-    assert policy.decide(Seen((None, None), mode="repair", first=0.0)).curve == "first"
-    assert policy.decide(Seen((None, None), LATER, mode="repair")).f_ttr == LATER
-    assert policy.decide(Seen((None, None), SOON, mode="repair")).curve == "hard"
+    assert policy.decide(Seen((LATER,), mode="repair", first=0.0)).curve == "first"
+    assert policy.decide(Seen((LATER,), LATER, mode="repair")).f_ttr == LATER
+    assert policy.decide(Seen((LATER,), SOON, mode="repair")).curve == "hard"
 
 
 # -- names and settings -----------------------------------------------------------------------------

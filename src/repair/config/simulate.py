@@ -32,7 +32,7 @@ class SimulateConfig:
     ttc: float = setting(2.0, "policy ttc: repairs below this time to collision [s]", low=0.0, high=60.0)
     delay: float = setting(0.5, "prediction delayed: how late the record is known [s]", low=0.0, high=60.0)
     gentle: list[float] = setting(
-        factory=lambda: [2.5, 4.0],
+        factory=lambda: [4.0],
         says="policy graded: friction limits of its repairs [m/s²], tried in this order before the hard one",
     )
     error: float = setting(

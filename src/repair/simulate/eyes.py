@@ -210,17 +210,14 @@ class Sight:
         """A repair that begins at once."""
         return self._search(self.eyes.hard, self.looked, (0.0,))
 
-    def gently(self, level: int, *, at_once: bool = False) -> Found | None:
-        """The F-TTR with a smaller friction limit, among everybody widened; None without a conflict.
-
-        ``at_once``: a repair that begins now instead.
-        """
+    def gently(self, level: int) -> Found | None:
+        """The F-TTR with a smaller friction limit, among everybody widened; None without a conflict."""
         grounds = self.eyes.grounds
         watch, traffic = self.eyes.gentle[level], self._traffic(grounds.config.simulate.error)
         looked = self.eyes.timed(lambda: watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now))
         if looked.conflict.time == float("inf"):
             return None
-        return self._search(watch, looked, (0.0,) if at_once else None)
+        return self._search(watch, looked, None)
 
     def sure(self) -> bool:
         """Whether the contact is there with everybody ahead of what is believed, and with everybody behind.

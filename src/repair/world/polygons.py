@@ -7,45 +7,46 @@ import numpy as np
 from repair.arrays import Array, Points
 from repair.world.advance import Left
 
-__all__ = ["polygon_gap", "polygons_left"]
+__all__ = ["polygons_left"]
 
 
 def polygons_left(parts: tuple[Array, ...]) -> tuple[Left, float]:
     """What is left of the gap to the nearest of convex polygons, and how far they reach [m].
+
+    The gap to each is taken along the axis that leaves most: one of the ego's two, or across an edge
+    (separating axes). All polygons are looked at in one go, and how far each extends across its own edges is
+    known beforehand.
 
     Parameters
     ----------
     parts : tuple of (V, 2) arrays
         Convex polygons, seen from the pose of the shape.
     """
-    outlines = [part[:, 0] + 1j * part[:, 1] for part in parts]
-    reach = max((float(np.abs(outline).max()) for outline in outlines), default=0.0)
+    if not parts:
+        return (lambda *_: float("inf")), 0.0
+    outlines, normals = _laid_out([part[:, 0] + 1j * part[:, 1] for part in parts])
+    across = (outlines[:, :, None] * normals.conj()[:, None, :]).real
+    low, high = across.min(axis=1), across.max(axis=1)
+    reach = float(np.abs(outlines).max())
 
     def left(seen: complex, moved: complex, own: complex, size: complex, half: complex) -> float:
-        gaps = (polygon_gap(outline * own + seen, half, moved) for outline in outlines)
-        return min((gap - most for gap, most in gaps), default=float("inf"))
+        turned, placed = normals * own, outlines * own + seen
+        shift = (seen * turned.conj()).real
+        wide = np.abs(turned.real) * half.real + np.abs(turned.imag) * half.imag
+        gaps = np.maximum(low + shift, -high - shift) - wide - np.abs((moved * turned.conj()).real)
+        x = np.maximum(placed.real.min(axis=1), -placed.real.max(axis=1)) - half.real - abs(moved.real)
+        y = np.maximum(placed.imag.min(axis=1), -placed.imag.max(axis=1)) - half.imag - abs(moved.imag)
+        return float(np.maximum(gaps.max(axis=1), np.maximum(x, y)).min())
 
     return left, reach
 
 
-def polygon_gap(points: Points, half: complex, moved: complex) -> tuple[float, float]:
-    """Gap between the ego and a convex polygon along the axis that leaves most, and how much of it may go.
-
-    Parameters
-    ----------
-    points : (V,) complex array
-        Corners, seen from the ego's middle and along its axis [m].
-    half : complex
-        Half length + i half width of the ego [m].
-    moved : complex
-        How far the polygon moves against the ego, likewise [m].
-    """
-    edges = np.roll(points, -1) - points
-    edges = edges[np.abs(edges) > 0.0]
-    normals = np.concatenate((np.array([1.0, 1j]), -1j * edges / np.abs(edges)))
-    projected = (points[:, None] * normals.conj()).real
-    reach = np.abs(normals.real) * half.real + np.abs(normals.imag) * half.imag
-    gaps = np.maximum(projected.min(axis=0) - reach, -reach - projected.max(axis=0))
-    most = np.abs((moved * normals.conj()).real)
-    best = int(np.argmax(gaps - most))
-    return float(gaps[best]), float(most[best])
+def _laid_out(outlines: list[Points]) -> tuple[Points, Points]:
+    """Corners (P, V) and normals of edges (P, V), as many for each polygon: some stand there twice."""
+    most = max(map(len, outlines))
+    corners = np.array([np.append(one, np.repeat(one[-1:], most - len(one))) for one in outlines])
+    edges = np.roll(corners, -1, axis=1) - corners
+    length = np.abs(edges)
+    normals = -1j * edges / np.where(length > 0.0, length, 1.0)
+    longest = np.take_along_axis(normals, length.argmax(axis=1)[:, None], axis=1)
+    return corners, np.where(length > 0.0, normals, longest)

@@ -75,6 +75,7 @@ class TrackTable:
         self.n_samples, self._block = n_samples, 2 * substeps
         self.tracks: list[Track] = []
         self.owner: list[int] = []
+        self._lefts: dict[tuple[int, int], tuple[Left, float]] = {}
         for index, track in all_tracks(obstacles, n_samples, substeps):
             self.tracks.append(track)
             self.owner.append(index)
@@ -177,8 +178,7 @@ class TrackTable:
         if kind == CIRCLE:
             left, reach = circle_left, 0.0
         elif kind == POLYGON:
-            made = self.tracks[track]
-            left, reach = polygons_left(made.polygons[made.steps.item(row // count)])
+            left, reach = self._polygons(track, self.tracks[track].steps.item(row // count))
         place = self.shapes.item(0, row) - here.item(first)
         begin, angle = (first + start) * unit, orientation.item(first)
         return Motion(
@@ -189,3 +189,9 @@ class TrackTable:
             heading, wrap(heading_end - heading).item(),
             reach, spare.item(first) if after > first else 0.0,
         ), left  # fmt: skip
+
+    def _polygons(self, track: int, step: int) -> tuple[Left, float]:
+        """What is left of the gap to polygons at a step, laid out once."""
+        if (track, step) not in self._lefts:
+            self._lefts[track, step] = polygons_left(self.tracks[track].polygons[step])
+        return self._lefts[track, step]

@@ -34,7 +34,7 @@ class Graded(AtFttr):
     conflict is over; after the last of them the policy is that of :class:`AtFttr`. So it is while it is
     doubtful whether there will be a contact at all (:meth:`repair.simulate.eyes.Sight.sure`).
 
-    Once off its plan it gains nothing by waiting: what it drives is repaired at once, as gently as can be.
+    Once off its plan it gains nothing by waiting: what it drives is repaired at once.
 
     Attributes
     ----------
@@ -50,7 +50,8 @@ class Graded(AtFttr):
     def decide(self, sight: Sight) -> Action:
         """Wait while a gentle repair is left for the next cycle."""
         if sight.mode != "plan":
-            return self._again(sight)
+            now = sight.first
+            return super().decide(sight) if now.curve is None else repair_by(now)
         if sight.now > self.since + 1.5 * sight.period:
             self.level = 0
         self.since = sight.now
@@ -66,14 +67,3 @@ class Graded(AtFttr):
                 break
             self.level += 1
         return super().decide(sight)
-
-    def _again(self, sight: Sight) -> Action:
-        """Another repair, from now on."""
-        for level in range(len(sight.eyes.gentle)):
-            found = sight.gently(level, at_once=True)
-            if found is None:
-                return KEEP
-            if found.curve is not None:
-                return repair_by(found)
-        found = sight.first
-        return super().decide(sight) if found.curve is None else repair_by(found)
