@@ -10,7 +10,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.io.plotting import import_matplotlib
 from repair.r157.cases import CASES
-from repair.r157.results import Fate, Results
+from repair.r157.results import AT_SIGHT, Fate, Results
 from repair.report.style import FigureStyle
 
 __all__ = ["SHOWN", "picture"]
@@ -48,23 +48,22 @@ def picture(results: Results, pair: tuple[int, int] | None) -> Any:
     across, up = (points.ego, points.deceleration) if braking else (points.distance, points.lateral)
     x, y = np.unique(across[rows]), np.unique(np.round(up[rows], 6))
     place = np.searchsorted(y, np.round(up[rows], 6)), np.searchsorted(x, across[rows])
-    names = [name for name in results.fates if name != "never"]
+    names = _panels(results, rows)
     wide = min(len(names), _ACROSS)
     deep = -(-len(names) // wide)
     style = FigureStyle()
     with rc_context({**style.rc, "axes.grid": False}):
         figure = Figure(figsize=(1.25 * style.width, 2.3 * deep + 1.0), layout="constrained")
         panels = figure.subplots(deep, wide, sharex=True, sharey=True, squeeze=False)
-        for axes, name in zip(panels.flat, names, strict=False):
+        for axes, (name, title) in zip(panels.flat, names.items(), strict=False):
             colours = np.zeros((len(y), len(x)))
             colours[place] = _colours(results, results.fates[name], rows)
-            _panel(axes, x, y, colours, name)
+            _panel(axes, x, y, colours, title)
         for axes in panels.flat[len(names) :]:
             axes.set_visible(False)
-        for axes in panels.flat[max(len(names) - wide, 0) : len(names)]:
-            axes.tick_params(labelbottom=True)
         words = ("speed [km/h]", "deceleration [g]") if braking else ("distance [m]", "lateral speed [m/s]")
-        for axes in panels[-1]:
+        for axes in panels.flat[max(len(names) - wide, 0) : len(names)]:  # with nothing below
+            axes.tick_params(labelbottom=True)
             axes.set_xlabel(words[0])
         for axes in panels[:, 0]:
             axes.set_ylabel(words[1])
@@ -77,6 +76,20 @@ def picture(results: Results, pair: tuple[int, int] | None) -> Any:
             told.append(Patch(color=_UNASKED, label="not looked at"))
         figure.legend(handles=told, loc="outside lower center", ncols=len(told), frameon=False)
     return figure
+
+
+def _panels(results: Results, rows: npt.NDArray[Any]) -> dict[str, str]:
+    """Policies and their titles; one that comes out as at the F-TTR is no panel of its own."""
+    made: dict[str, str] = {}
+    for name, fate in results.fates.items():
+        late = name.removesuffix(AT_SIGHT)
+        if name == "never":
+            continue
+        if late in made and (fate.struck[rows] == results.fates[late].struck[rows]).all():
+            made[late] = f"{late}, F-TTR or sight"
+            continue
+        made[name] = name
+    return made
 
 
 def _colours(results: Results, fate: Fate, rows: npt.NDArray[Any]) -> Array:

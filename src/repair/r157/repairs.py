@@ -14,7 +14,7 @@ from repair.r157.cases import Flags, Points
 from repair.r157.drive import drive, keep
 from repair.r157.models import FULL, Seen
 from repair.r157.motion import HEADWAY, sight
-from repair.r157.results import Fate, Results, by_models
+from repair.r157.results import AT_SIGHT, Fate, Results, by_models
 from repair.timegrid import INSTANT, steps_until
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def _fates(
         everywhere = np.ones(len(points), dtype=bool)
         for words, known, begun in (
             ("", peak, late),
-            (", at sight", at_once, np.where(np.isnan(at_once), np.nan, seen)),
+            (AT_SIGHT, at_once, np.where(np.isnan(at_once), np.nan, seen)),
         ):
             struck = conflict & np.isnan(known)
             fates[f"{backend} {manner}{words}"] = Fate(

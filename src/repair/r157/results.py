@@ -18,7 +18,11 @@ from repair.report.tables import DASH, Section, Table
 from repair.timegrid import INSTANT
 from repair.vehicle.parameters import load_vehicle
 
-__all__ = ["Fate", "Results", "by_models", "contradicted", "rows_of", "table_of"]
+__all__ = ["AT_SIGHT", "Fate", "Results", "by_models", "contradicted", "rows_of", "table_of"]
+
+
+#: Added to the name of a repair that begins as soon as there is somebody to react to.
+AT_SIGHT = ", at sight"
 
 
 @dataclass(frozen=True)

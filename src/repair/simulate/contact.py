@@ -16,6 +16,8 @@ from repair.scene.traffic.obstacle import Obstacle
 
 __all__ = ["Struck", "first_struck", "least_distance"]
 
+_BULGE = 1.0  # who turns between two steps reaches beyond the box around both by less than this [m]
+
 
 @dataclass(frozen=True)
 class Struck:
@@ -106,6 +108,10 @@ def _near(one: Obstacle, poses: Array, size: tuple[float, float], margin: float)
     """Samples at which circles around both come as near as a margin."""
     per = _per_step(one, poses)
     rows = one.vertices
+    room = 0.5 * float(np.hypot(*size)) + margin + _BULGE
+    low, high = np.fmin.reduce(rows, axis=(0, 1)), np.fmax.reduce(rows, axis=(0, 1))
+    if (poses[:, :2].min(axis=0) - room > high).any() or (poses[:, :2].max(axis=0) + room < low).any():
+        return np.zeros(0, dtype=np.intp)  # most are far off all the time
     middle = np.nanmean(rows, axis=1) if np.isfinite(rows).all() else _means(rows)
     radius = float(np.nanmax(np.hypot(*(rows - middle[:, None]).transpose(2, 0, 1))))
     samples = np.arange(len(poses))
