@@ -8,7 +8,7 @@ from repair.errors import ConfigError
 from repair.registry import Registry
 from repair.timegrid import ROUNDING, intervals
 
-__all__ = ["RULES", "IsOpen", "Order", "Rule", "around", "probe_order"]
+__all__ = ["CONTIGUOUS", "RULES", "IsOpen", "Order", "Rule", "around", "from_the_end", "probe_order"]
 
 #: Yields the next t_rep [s], is sent whether it was feasible.
 Order = Generator[float, bool, None]
@@ -39,7 +39,16 @@ def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
 
 def _guided(end: float, delta_t: float, is_open: IsOpen) -> Order:
     size = _grid_size(end, delta_t)
-    order = around(_last_open(size, delta_t, is_open), -1, size)
+    return _on_grid(around(_last_open(size, delta_t, is_open), -1, size), delta_t)
+
+
+def from_the_end(end: float, delta_t: float) -> Order:
+    """The last point of the grid below ``end`` [s], and from there to where feasible and infeasible meet."""
+    size = _grid_size(end, delta_t)
+    return _on_grid(around(size - 1, -1, size), delta_t)
+
+
+def _on_grid(order: Generator[int, bool, None], delta_t: float) -> Order:
     answer: bool | None = None
     while True:
         try:
@@ -109,6 +118,9 @@ def _as_printed(end: float, delta_t: float, is_open: IsOpen) -> Order:
 
 #: A rule makes the order of visits from the upper end, Delta T, and the guess at what is open.
 Rule = Callable[[float, float, IsOpen], Order]
+
+#: The rules that take feasibility to be contiguous.
+CONTIGUOUS = ("bisect", "guided")
 
 RULES: Registry[Rule] = Registry(
     "search rule",

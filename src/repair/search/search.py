@@ -29,7 +29,7 @@ from repair.search.probe import (
     words,
 )
 from repair.search.result import Probe, SearchResult, SearchStatus
-from repair.search.rules import IsOpen, Order, probe_order
+from repair.search.rules import CONTIGUOUS, IsOpen, Order, from_the_end, probe_order
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT, ROUNDING, on_grid
 
@@ -78,7 +78,7 @@ def iter_probes(
         return any(problem.passing is None or problem.passing.open for problem in made[t_rep])
 
     given = None if visits is None else _given(visits)
-    order = given or _order(settings, end, is_open, after)
+    order = given or _order(settings, end, is_open, after, latest_first=backend.capabilities.own_way)
     warm_start: Curve | None = None
     if after is not None and backend.capabilities.uses_warm_start:
         warm_start = after.solve.curve
@@ -110,8 +110,14 @@ def _says_nothing_of_later_ones(probe: Probe) -> bool:
     return probe.t_rep < INSTANT and {v.reason for v in probe.verdict.violations} == {Reason.UNSAFE_END}
 
 
-def _order(settings: SearchConfig, end: float, is_open: IsOpen, after: Probe | None) -> Order:
-    """The visits of the rule below ``end`` [s]; those after a probe as if the grid began one step later."""
+def _order(
+    settings: SearchConfig, end: float, is_open: IsOpen, after: Probe | None, *, latest_first: bool
+) -> Order:
+    """The visits of the rule below ``end`` [s]; those after a probe as if the grid began one step later.
+
+    Who finds its own way mostly finds one almost until it is proven too late. Where the rule takes
+    feasibility to be contiguous, it then begins at the end.
+    """
     rule, step = settings.rule, settings.delta_t
     if after is None:
         return probe_order(rule, end, step, is_open)
@@ -121,6 +127,8 @@ def _order(settings: SearchConfig, end: float, is_open: IsOpen, after: Probe | N
         near = on_grid(begin + since, step)
         return near if abs(near - begin - since) <= ROUNDING else begin + since
 
+    if latest_first and rule in CONTIGUOUS:
+        return _later(from_the_end(end - begin, step), at)
     return _later(probe_order(rule, end - begin, step, lambda since: is_open(at(since))), at)
 
 
