@@ -10,10 +10,12 @@ from repair.metrics.registry import METRICS
 from repair.reference.registry import SOURCES
 from repair.save import FORMATS
 from repair.search.rules import RULES
+from repair.simulate.policies.registry import POLICIES
+from repair.simulate.predictions.registry import PREDICTIONS
 from repair.solvers.registry import BACKENDS
 from repair.vehicle.model import VEHICLES
 
-REGISTRIES = (BACKENDS, CHECKS, FORMATS, METRICS, RULES, SOURCES, VEHICLES)
+REGISTRIES = (BACKENDS, CHECKS, FORMATS, METRICS, POLICIES, PREDICTIONS, RULES, SOURCES, VEHICLES)
 
 
 @contextmanager

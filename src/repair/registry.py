@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from repair.errors import RepairError
 
-__all__ = ["Registry", "loaded"]
+__all__ = ["Part", "Registry", "adopt", "loaded", "registered"]
 
 T = TypeVar("T")
+
+#: What a program registered: module and attribute of the registry, the name, and the thing.
+Part = tuple[str, str, str, Any]
 
 
 class Registry(Generic[T]):
@@ -120,6 +124,27 @@ def loaded(thing: str | T) -> T:
     module, _, name = thing.partition(":")
     found: T = getattr(import_module(module), name)
     return found
+
+
+def registered() -> list[Part]:
+    """What this program has registered in any of the package's registries, as :func:`adopt` takes it."""
+    found: dict[int, list[Part]] = {}
+    for home, module in list(sys.modules.items()):
+        if not home.startswith("repair."):
+            continue
+        for attribute, registry in list(vars(module).items()):
+            if isinstance(registry, Registry):  # several modules may have it; one is enough
+                parts = [(home, attribute, *part) for part in registry._registered.items()]
+                found.setdefault(id(registry), parts)
+    return [part for parts in found.values() for part in parts]
+
+
+def adopt(parts: Iterable[Part]) -> None:
+    """Register, in this process, what another one has; what is there already stays."""
+    for home, attribute, name, thing in parts:
+        registry: Registry[Any] = getattr(import_module(home), attribute)
+        if name not in registry:
+            registry.register(name, thing)
 
 
 @lru_cache(maxsize=1)

@@ -93,7 +93,8 @@ def keys_of(section: Any, prefix: str = "") -> Iterator[Key]:
     """All keys of a section (a dataclass type), those of its own sections included, in order."""
     hints = get_type_hints(section)
     for item in fields(section):
-        made = item.default if item.default_factory is MISSING else item.default_factory()
+        # Not by `is MISSING`: a section that was handed over from another process has a mark of its own.
+        made = item.default_factory() if callable(item.default_factory) else item.default
         if is_dataclass(made):
             yield from keys_of(type(made), f"{prefix}{item.name}.")
         else:

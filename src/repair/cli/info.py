@@ -59,7 +59,7 @@ def completion(arguments: argparse.Namespace) -> int:
     try:
         import shtab
     except ImportError as error:
-        raise RepairError("completion needs shtab: pip install 'commonroad-repair[completion]'") from error
+        raise RepairError("completion needs shtab: pip install shtab") from error
     known: argparse.ArgumentParser = arguments.parser
     for verbs in (one for one in known._actions if isinstance(one, argparse._SubParsersAction)):
         for action in (one for own in verbs.choices.values() for one in own._actions):

@@ -63,8 +63,7 @@ class ClusterLanes:
             import distributed
         except ImportError as error:
             raise RepairError(
-                "a Dask cluster needs the package distributed: pip install 'commonroad-repair[cluster]' "
-                f"({error})"
+                f"a Dask cluster needs the package distributed: pip install distributed ({error})"
             ) from error
         try:
             connect: Any = distributed.Client

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 from repair.errors import RepairError
 from repair.study.plan import Task
 from repair.study.rows import failed_row, one_line, strict
-from repair.study.worker import TOO_MUCH_MEMORY, Answer, begin, run_task, started
+from repair.study.worker import TOO_MUCH_MEMORY, Answer, begin, parts_of_the_program, run_task, started
 
 __all__ = ["Lane", "Lanes", "LocalLanes", "rows_of"]
 
@@ -71,6 +71,7 @@ class _Local:
 
     name: str
     work: Work
+    parts: bytes = b""  # what the program has registered
     most: float = _MOST
     executor: Any = None
     hello: Future[str] | None = None
@@ -81,7 +82,7 @@ class _Local:
 
             threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
             self.executor = ProcessPoolExecutor(
-                max_workers=1, initializer=begin, initargs=(os.getpid(),), env=threads
+                max_workers=1, initializer=begin, initargs=(os.getpid(), self.parts), env=threads
             )
             self.hello = self.executor.submit(started)
         made: Future[Answer] = self.executor.submit(self.work, task)
@@ -104,13 +105,19 @@ class LocalLanes:
     ----------
     count : int
     work : callable
-        What is done with a task, in a process of its own.
+        What is done with a task, in a process of its own. What the program has registered is known there.
+
+    Raises
+    ------
+    RepairError
+        If that cannot be handed over.
     """
 
     def __init__(self, count: int, work: Work = run_task) -> None:
         if count < 1:
             raise RepairError(f"{count} worker processes are asked for; at least one is needed")
-        self.lanes = [_Local(f"worker {k + 1}", work) for k in range(count)]
+        parts = parts_of_the_program()
+        self.lanes = [_Local(f"worker {k + 1}", work, parts) for k in range(count)]
 
     def now(self) -> Sequence[Lane]:
         """All of them; a process is started when it is first given something."""

@@ -54,9 +54,7 @@ def _parquet(rows: list[dict[str, Any]]) -> bytes:
         import pyarrow
         import pyarrow.parquet as parquet
     except ImportError as error:
-        raise RepairError(
-            f"Parquet needs the package pyarrow: pip install 'commonroad-repair[parquet]' ({error})"
-        ) from error
+        raise RepairError(f"Parquet needs the package pyarrow: pip install pyarrow ({error})") from error
     kinds = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
     made = {}
     for name in rows[0]:

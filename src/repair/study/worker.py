@@ -13,10 +13,14 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+from repair.errors import RepairError, in_words
+from repair.registry import adopt, registered
 from repair.study.plan import Task, package_version
 from repair.study.task import Kept, row_of
 
-__all__ = ["TOO_MUCH_MEMORY", "Answer", "begin", "peak_memory", "run_task", "started"]
+__all__ = [
+    "TOO_MUCH_MEMORY", "Answer", "begin", "parts_of_the_program", "peak_memory", "run_task", "started",
+]  # fmt: skip
 
 #: A row, and the whole result.
 Answer = tuple[dict[str, Any], bytes | None]
@@ -47,13 +51,15 @@ class _Watch(threading.Thread):
             time.sleep(_LOOKS)
 
 
-def begin(parent: int | None = None) -> None:
+def begin(parent: int | None = None, parts: bytes = b"") -> None:
     """Make a process ready: quiet, deaf to Ctrl-C, which is for who started it, and watched.
 
     Parameters
     ----------
     parent : int, optional
         The process without which this one is to end.
+    parts : bytes
+        What the program that started it has registered (:func:`parts_of_the_program`).
     """
     global _watch  # noqa: PLW0603  one for each process
     if parent is not None:
@@ -64,6 +70,33 @@ def begin(parent: int | None = None) -> None:
     if _watch is None:
         _watch = _Watch(parent)
         _watch.start()
+    if parts:
+        from joblib.externals.loky.backend.reduction import loads
+
+        adopt(loads(parts))
+
+
+def parts_of_the_program() -> bytes:
+    """What this program has registered, for the processes that it starts; empty where it has nothing.
+
+    Raises
+    ------
+    RepairError
+        If a part cannot be handed over.
+    """
+    parts = registered()
+    if not parts:
+        return b""
+    from joblib.externals.loky.backend.reduction import dumps
+
+    try:
+        return bytes(dumps(parts))
+    except Exception as error:  # whatever a foreign object raises
+        names = ", ".join(repr(part[2]) for part in parts)
+        raise RepairError(
+            f"what this program registered ({names}) cannot be handed to other processes: {in_words(error)}; "
+            "let an installed package announce it"
+        ) from error
 
 
 def started() -> str:

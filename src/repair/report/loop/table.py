@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from statistics import median
 from typing import Any
@@ -112,7 +113,17 @@ def table_of(rows: Sequence[Row]) -> str:
     for (prediction, policy), own in groups.items():
         lines.append(_line(prediction, policy, own))
     lines += ["", *(_below(*name, own) for name, own in groups.items()), *_against(groups)]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_why_not(left_out)])
+
+
+def _why_not(left_out: Sequence[Row], most: int = 8) -> list[str]:
+    """Why drives were left out: each reason with its number, the most frequent first."""
+    if not left_out:
+        return []
+    counted = Counter(f"{row['status']}: {row.get('detail') or 'without a word'}" for row in left_out)
+    lines = [f"left out, {number} drives, {why}" for why, number in counted.most_common(most)]
+    rest = len(counted) - len(lines)
+    return ["", *lines, *([f"left out for {rest} more reasons"] if rest else [])]
 
 
 def _line(prediction: str, policy: str, own: Sequence[Row]) -> str:

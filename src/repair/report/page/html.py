@@ -86,9 +86,7 @@ def _plotly() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
-        raise PlotlyMissing(
-            f"a report needs the package plotly: pip install 'commonroad-repair[report]' ({error})"
-        ) from error
+        raise PlotlyMissing(f"a report needs the package plotly: pip install plotly ({error})") from error
     return str(get_plotlyjs())
 
 
