@@ -325,6 +325,8 @@ def test_the_table_counts():
     low, high = interval(rows, lambda some: summary(some)["for_nothing"])
     assert low == 0.0
     assert high >= 4.0  # of file b alone
+    assert interval(rows, lambda some: 2 * len(some), len) == (2.0, 2.0)
+    assert np.isnan(interval(rows, len, lambda some: 0)).all()
     others = [{**row, "policy": "at_once", "interventions": 1, "first_intervention_s": 0.0} for row in rows]
     text = table_of([*rows, *others, {**rows[0], "status": "not_driven", "file": "d"}])
     assert "5 cases" not in text  # two of a file and plan are one case here

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 __all__ = ["HARD", "cycles_of", "groups_of", "interval", "summary", "table_of"]
 
 Row = Mapping[str, Any]
+Count = Callable[[Sequence[Row]], int]
 HARD = 4.0  # a deceleration from here on is a hard one [m/s²]
 _DRAWS = 2000
 _HEAD = (
@@ -29,24 +31,40 @@ def groups_of(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
     return found
 
 
-def interval(rows: Sequence[Row], count: Callable[[Sequence[Row]], float]) -> tuple[float, float]:
-    """95 % interval of a number by bootstrap over files: drives of one file are near-duplicates.
+def interval(rows: Sequence[Row], count: Count, against: Count | None = None) -> tuple[float, float]:
+    """95 % interval of a count, or of its ratio to another one, by bootstrap over files.
 
-    Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, ch. 13 (percentiles), with fixed draws.
+    Drives of one file are near-duplicates. Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993,
+    ch. 13 (percentiles), with fixed draws.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+    count, against : callable
+        How often something is so in rows: the counts of files add up.
     """
-    names = sorted({row["file"] for row in rows})
-    own = {name: [row for row in rows if row["file"] == name] for name in names}
-    rng = np.random.default_rng(0)
-    drawn = []
-    for _ in range(_DRAWS):
-        chosen = rng.integers(0, len(names), len(names))
-        value = count([row for k in chosen for row in own[names[k]]])
-        if np.isfinite(value):
-            drawn.append(value)
-    if not drawn:
+    files: dict[str, list[Row]] = {}
+    for row in rows:
+        files.setdefault(row["file"], []).append(row)
+    own = [files[name] for name in sorted(files)]
+    chosen = np.random.default_rng(0).integers(0, len(own), (_DRAWS, len(own)))
+    drawn = np.array([count(each) for each in own], dtype=np.float64)[chosen].sum(axis=1)
+    if against is not None:
+        others = np.array([against(each) for each in own], dtype=np.float64)[chosen].sum(axis=1)
+        drawn = drawn[others > 0.0] / others[others > 0.0]
+    if not len(drawn):
         return float("nan"), float("nan")
     low, high = np.percentile(drawn, (2.5, 97.5))
     return float(low), float(high)
+
+
+def _for_nothing(rows: Sequence[Row], policy: str | None = None) -> int:
+    """How many act though the plan touches nobody; by one policy, or all."""
+    return sum(
+        row["plan_contact_s"] is None and bool(row["interventions"])
+        for row in rows
+        if policy in (None, row["policy"])
+    )
 
 
 def summary(rows: Sequence[Row]) -> dict[str, Any]:
@@ -128,7 +146,7 @@ def _why_not(left_out: Sequence[Row], most: int = 8) -> list[str]:
 
 def _line(prediction: str, policy: str, own: Sequence[Row]) -> str:
     s = summary(own)
-    low, high = interval(own, lambda rows: summary(rows)["for_nothing"])
+    low, high = interval(own, _for_nothing)
     cells = (
         prediction, policy, s["drives"], f"{s['avoided']} of {s['contacts']}",
         f"{s['struck']} ({s['struck_not_from_behind']})", s["acted"],
@@ -164,18 +182,11 @@ def _against(groups: Mapping[tuple[str, str], Sequence[Row]]) -> list[str]:
         others = groups.get((prediction, "at_once"))
         if policy in ("at_once", "never") or others is None:
             continue
-        both = [{**row, "mine": True} for row in own] + [{**row, "mine": False} for row in others]
-
-        def share(rows: Sequence[Row]) -> float:
-            mine = summary([row for row in rows if row["mine"]])["for_nothing"]
-            theirs = summary([row for row in rows if not row["mine"]])["for_nothing"]
-            return mine / theirs if theirs else float("nan")
-
-        if not np.isfinite(share(both)):  # at_once never does
+        if not (theirs := _for_nothing(others)):
             continue
-        low, high = interval(both, share)
-        lines.append(
-            f"{prediction}: {policy} acts for nothing {share(both):.2f} [{low:.2f}, {high:.2f}] times as "
-            "often as at_once"
-        )
+        counts = (partial(_for_nothing, policy=name) for name in (policy, "at_once"))
+        low, high = interval([*own, *others], *counts)
+        share = _for_nothing(own) / theirs
+        words = f"{prediction}: {policy} acts for nothing {share:.2f} [{low:.2f}, {high:.2f}] times as often"
+        lines.append(f"{words} as at_once")
     return ["", *lines] if lines else []
