@@ -15,15 +15,26 @@ os.environ["MPLBACKEND"] = "Agg"
 # Now: a test may change the environment before the first one asks.
 _SCENARIOS = os.environ.get("COMMONROAD_SCENARIOS")
 
-settings.register_profile("repair", derandomize=True, deadline=None, max_examples=50)
+settings.register_profile("repair", derandomize=True, deadline=None, max_examples=30)
 settings.load_profile("repair")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test that reads scenario files, so that `-m "not scenarios"` leaves it out."""
+    """Mark what reads scenario files, and what is left to `-m exhaustive`.
+
+    Of the cases of a test that is `thinned(k)` every k-th runs by default, from the first on.
+    """
+    seen: dict[str, int] = {}
     for item in items:
         if "scenarios" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.scenarios)
+        thinned = item.get_closest_marker("thinned")
+        if thinned is not None:
+            name = item.nodeid.partition("[")[0]
+            seen[name] = seen.get(name, -1) + 1
+            if seen[name] % thinned.args[0]:
+                item.add_marker(pytest.mark.exhaustive)
 
 
 @pytest.fixture(scope="session")

@@ -72,6 +72,7 @@ def assert_contract(problem, result, capabilities):
         )
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("name", sorted(ALL))
 def test_every_problem_keeps_the_contract(variant, name):
     problem = ALL[name]()

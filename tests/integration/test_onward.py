@@ -65,6 +65,7 @@ def official(result: repair.RepairResult, folder: Path):
     return check_solution_file(file, scene.official(), PlanningProblemSet([scene.planning_problem]))
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("backend", ["casadi", "qptr"])
 @pytest.mark.parametrize(
     "wanted",

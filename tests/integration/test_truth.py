@@ -163,6 +163,7 @@ SAME = {
 BOTH = SLOW + driving(31, 0.0, 0.0, 14.0)  # and a faster one behind
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("change", SAME)
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("traffic", [SLOW, BOTH], ids=["ahead", "both"])

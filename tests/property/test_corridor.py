@@ -97,6 +97,7 @@ def plain_piece(task, begin, end):
     return t, s, low, high, (max(right), min(left))
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("lateral", [False, True])
 @pytest.mark.parametrize("t_rep", [0.0, 0.33, 1.6])
 @pytest.mark.parametrize("seed", range(40))

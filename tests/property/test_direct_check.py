@@ -109,6 +109,7 @@ def transition(kind, vehicle, dt, rng):
     )
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("type_id", [1, 2, 3, 4])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_direct_yes_is_an_official_yes(kind, type_id):
@@ -158,6 +159,7 @@ def test_ordinary_driving_is_accepted_without_asking(type_id, dt):
     assert official_check(states, dt, vehicle, range(0, 50, 10)).ok.all()
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_transition_is_judged_alike_wherever_it_is(kind):
     rng = np.random.default_rng(KINDS.index(kind))

@@ -138,6 +138,7 @@ def test_a_result_of_an_earlier_version_is_certified_alike(written, folder):
     assert main(["certify", str(folder)]) == 0
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("earlier", [False, True])
 def test_how_far_into_a_box_a_hard_repair_may_go_is_its_own_word(folder, earlier):
     """A soft one promises nothing, but what ``checker.margin`` asks for at the scenario's steps."""
@@ -166,6 +167,7 @@ def test_how_far_into_a_box_a_hard_repair_may_go_is_its_own_word(folder, earlier
     assert rows() == {(0.0, False)}
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("preset", ["scenario_1", "scenario_2"])
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 def test_what_a_preset_finds_is_certified(preset, backend, tmp_path):

@@ -331,6 +331,7 @@ def test_an_honest_result_is_certified(folder):
     assert "judged under" in shown
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize(
     "folder, mutation",
     [

@@ -28,6 +28,7 @@ def states(rng, share):
     return np.arange(count + 1) * dt, speed, slip, steering
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("seed", range(40))
 def test_the_vehicle_is_asked_for_the_same_as_by_the_certificate(seed):
     """Grip, engine and steering, at the states that are written: two formulas, one verdict."""

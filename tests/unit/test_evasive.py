@@ -337,6 +337,7 @@ def test_keys_of_the_search_become_notes_at_the_ttr(junction):
 NAMES = ("ttb", "ttk", "tts", "ttr")
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("driver", ["f_ttr", "at_ttr"])
 def test_metrics_are_those_of_the_maneuvers(junction, damage, driver):
     for number, scene in ((1, junction), (2, damage)):

@@ -422,6 +422,7 @@ def test_figures_from_the_folder_are_those_that_were_saved(found: RepairResult, 
         assert render(one, "svg") == render(two, "svg")
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("status", [s for s in SearchStatus if s is not SearchStatus.FOUND])
 def test_a_result_without_a_repair_is_read_back_too(
     found: RepairResult, status: SearchStatus, tmp_path: Path

@@ -63,6 +63,7 @@ def accepted(result: repair.RepairResult, file: Path, folder: Path) -> None:
 # -- ids are names -------------------------------------------------------------------------------------
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("huge", [2**63 - 1, 2**63, 2**64 + 5, 10**20])
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_ids_of_any_size(huge: int, backend: str, load: Load) -> None:
@@ -113,6 +114,7 @@ def without_velocity(kind: str) -> str:
     return roads.car(30, start)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("kind", ["trajectory", "nowhere a velocity", "sets", "no prediction"])
 @pytest.mark.parametrize("after", ["remove", "constant_velocity"])
 def test_a_start_without_velocity(kind: str, after: str, load: Load) -> None:
@@ -178,6 +180,7 @@ def pausing(which: str) -> str:
     )
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("which", THERE)
 def test_sets_that_start_late_or_pause(which: str, load: Load) -> None:
     scene = load(pausing(which))
@@ -197,6 +200,7 @@ def test_sets_that_start_late_or_pause(which: str, load: Load) -> None:
         assert found.kind == "none"
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("which", ["late interval", "pauses before", "pauses while the ego passes"])
 def test_sets_that_start_late_or_pause_in_the_files(which: str, tmp_path: Path) -> None:
     file = tmp_path / "ZAM_Test-1_1_T-1.xml"
@@ -206,6 +210,7 @@ def test_sets_that_start_late_or_pause_in_the_files(which: str, tmp_path: Path) 
     accepted(result, file, tmp_path / "out")
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("which", THERE)
 def test_commonroads_own_check_reads_the_same_sets(which: str, load: Load) -> None:
     """The straight drive meets them or not, by the drivability checker on what it is handed."""
@@ -232,6 +237,7 @@ def test_an_obstacle_that_appears_late(load: Load) -> None:
 # -- no prediction -------------------------------------------------------------------------------------
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("heading", [0.0, math.pi / 2, 2 * math.pi, -1.5 * math.pi])
 @pytest.mark.parametrize("speed", [12.0, 3.0])
 def test_without_a_prediction(heading: float, speed: float, load: Load) -> None:
@@ -283,6 +289,7 @@ def turned(ego: float, other: float) -> str:
     )
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("heading", HEADINGS)
 def test_headings_of_more_than_half_a_turn(heading: float, load: Load) -> None:
     usual = 0.0 if math.cos(heading) > 0.0 else math.pi
@@ -293,6 +300,7 @@ def test_headings_of_more_than_half_a_turn(heading: float, load: Load) -> None:
     assert found.contact_time == pytest.approx(plain.contact_time, abs=2e-3)
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("heading", HEADINGS)
 @pytest.mark.parametrize("backend", ["ego", "casadi"])
 def test_the_written_heading_is_in_the_same_turn(heading: float, backend: str, tmp_path: Path) -> None:

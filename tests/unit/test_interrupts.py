@@ -43,6 +43,7 @@ entry()
     )  # fmt: skip
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("moment", _AT)
 def test_an_interrupt_after_the_search_loses_nothing(moment, tmp_path):
     folder = tmp_path / "out"

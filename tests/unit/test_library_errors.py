@@ -414,6 +414,7 @@ def change(folder, name, key, value):
     (folder / name).write_text(json.dumps(content), encoding="utf-8")
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize(
     "name, key", [*(("result.json", k) for k in KEYS), *(("drawing.json", k) for k in DRAWN)]
 )

@@ -115,6 +115,7 @@ def test_planned_reference_starts_with_the_ego_and_is_drivable(scenarios, name):
     assert official_check(states, scene.dt, scene.vehicle, left).ok.all()
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("name", SOME)
 @pytest.mark.parametrize("a_lat", [0.6, 1.2, 2.0])
 def test_planned_reference_respects_comfort(scenarios, name, a_lat):

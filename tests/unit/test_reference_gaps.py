@@ -145,6 +145,7 @@ def test_a_recorded_obstacle_that_is_not_there_yet_is_no_reference(tmp_path):
 # -- what CommonRoad allows ----------------------------------------------------------------------------
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.filterwarnings("ignore")  # of the checker, about NumPy and SciPy
 @pytest.mark.parametrize("model", ["KS1", "KS3", "ST2", "PM1"])
 @pytest.mark.parametrize("dt", [0.04, 0.1, 0.3])

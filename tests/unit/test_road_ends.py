@@ -32,6 +32,7 @@ def answer(scene, backend: str, *more: str):
     return repair.repair(scene, backend=backend, overrides=["reference.source=constant", *more])
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 @pytest.mark.parametrize("left, v", [(20.0, 5.0), (20.0, 12.0), (50.0, 12.0), (50.0, 20.0), (80.0, 20.0)])
 def test_the_end_of_the_road_is_yielded_to(tmp_path: Path, backend: str, left: float, v: float) -> None:

@@ -85,6 +85,7 @@ def test_the_size_of_a_gap_that_is_road_is_a_setting(tmp_path: Path) -> None:
     assert answer(scene, "ego", "checker.road_gap=0").search.conflict.kind == "off_road"
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("gap", [0.001, 0.1, 0.35])
 @pytest.mark.parametrize("declared", [True, False])
 def test_a_gap_to_the_neighbour_is_road(tmp_path: Path, gap: float, declared: bool) -> None:

@@ -181,6 +181,7 @@ def test_the_seed_decides_and_nothing_else():
     assert not np.array_equal(points[0], points[2])
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("seed", range(20))
 def test_a_start_with_another_acceleration_keeps_the_limits(seed):
     random, limits = np.random.default_rng(seed), toy.LIMITS
@@ -236,6 +237,7 @@ def test_sets_hold_on_both_sides_of_their_step():
     assert set(held[np.isfinite(held[:, 1, 0]), 1, 0]) == {2.0}
 
 
+@pytest.mark.thinned(2)
 def test_it_is_asked_once_for_each_t_rep_and_its_results_are_certified(tmp_path, scenario_1):
     result = scenario_1
     assert result.f_ttr is not None

@@ -15,6 +15,7 @@ from repair.api import repair
 FULL = 2.0 * np.pi
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.filterwarnings("ignore")  # of the checker, about NumPy
 @pytest.mark.parametrize("speed", [0.0, 0.005, 0.3, 8.0])
 @pytest.mark.parametrize("heading", [0.0, 1.6, 3.1, np.pi, -np.pi, -3.1, 6.28, -6.28, 4.0, -5.0])
