@@ -39,16 +39,7 @@ def _bisect(end: float, delta_t: float, is_open: IsOpen) -> Order:
 
 def _guided(end: float, delta_t: float, is_open: IsOpen) -> Order:
     size = _grid_size(end, delta_t)
-    return _on_grid(around(_last_open(size, delta_t, is_open), -1, size), delta_t)
-
-
-def from_the_end(end: float, delta_t: float) -> Order:
-    """The last point of the grid below ``end`` [s], and from there to where feasible and infeasible meet."""
-    size = _grid_size(end, delta_t)
-    return _on_grid(around(size - 1, -1, size), delta_t)
-
-
-def _on_grid(order: Generator[int, bool, None], delta_t: float) -> Order:
+    order = around(_last_open(size, delta_t, is_open), -1, size)
     answer: bool | None = None
     while True:
         try:
@@ -56,6 +47,18 @@ def _on_grid(order: Generator[int, bool, None], delta_t: float) -> Order:
         except StopIteration:
             return
         answer = yield k * delta_t
+
+
+def from_the_end(end: float, delta_t: float) -> Order:
+    """The last point of the grid below ``end`` [s], and where that is not feasible bisection."""
+    feasible, infeasible = -1, _grid_size(end, delta_t)
+    k = infeasible - 1
+    while infeasible - feasible > 1:
+        if (yield k * delta_t):
+            feasible = k
+        else:
+            infeasible = k
+        k = (feasible + infeasible) // 2
 
 
 def around(first: int, feasible: int, size: int) -> Generator[int, bool, None]:
