@@ -15,6 +15,7 @@ from tests.roads import SLOW, driving, lanelet, problem, scenario, state
 from tests.unavoidable import situation
 
 import repair
+from repair.certify.recompute import certify
 from repair.cli.command import main
 from repair.io.trace.fingerprint import fingerprint
 from repair.scene.reading import read_solution
@@ -250,6 +251,13 @@ def test_from_memory_it_is_of_the_scenario_that_is_written(slow, tmp_path):
     trace = json.loads((tmp_path / "out" / record["trace_file"]).read_text("utf-8"))
     written = (tmp_path / "out" / record["scenario_file"]).read_bytes()
     assert trace["scenarioFingerprint"] == fingerprint(written)
+
+
+def test_a_result_with_a_trace_is_certified_and_read_back(tmp_path):
+    record, _, _, _ = run(tmp_path, scenario(obstacles=SLOW))
+    certificate = certify(tmp_path / "out")
+    assert certificate.ok, [row for row in certificate.rows if not row.ok]
+    assert repair.load_result(tmp_path / "out").record == record
 
 
 def test_a_run_without_a_trace_leaves_none_of_an_earlier_one(tmp_path):

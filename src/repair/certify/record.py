@@ -21,6 +21,7 @@ __all__ = ["Again", "differences", "other_versions", "record_rows", "searched_ag
 _FREE = frozenset(
     {"time_s", "versions", "solution_file", "figure_files", "scenario_file", "scenario_sha256",
      "scenario_file_problem", "report_file", "report_file_problem", "modes", "drawing_file", "provenance",
+     "trace_file", "verdict_file",
      "config", "config_given", "build_time_s", "solve_time_s", "check_time_s", "iterations", "bound",
      "explanation"}
 )  # fmt: skip

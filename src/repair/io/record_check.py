@@ -185,6 +185,8 @@ _OTHERS: dict[str, Test] = {
     "report_file_problem": _text,
     "scenario_file": _maybe(_text),
     "drawing_file": _maybe(_text),
+    "trace_file": _text,
+    "verdict_file": _maybe(_text),
     "checks_off": _list_of(_text),
     "repaired_by": _maybe(_text),
     "by_fallback": _maybe(_flag),
