@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from benchmarks import machine, measure, phases, table
+from benchmarks import graded, machine, measure, phases, table
 
 
 @pytest.mark.parametrize("group", [phases.CHECKS, phases.LITERAL, *phases.SOLVING.values()])
@@ -60,3 +60,14 @@ def test_columns_are_aligned_and_empty_ones_left_out(capsys: pytest.CaptureFixtu
     *_, group, head, first, second = capsys.readouterr().out.splitlines()
     assert (group, head.split()) == ("g", ["median"])
     assert [first, second] == ["  a         1.00  ms", "  longer     123  ms"]
+
+
+def test_no_place_is_on_both_sides() -> None:
+    files = [
+        f"{place}-{k}_1.xml" for place, many in (("A", 1), ("B", 4), ("C", 2), ("D", 2)) for k in range(many)
+    ]
+    one, two = graded.halves(reversed(files))
+    assert one | two == set(files)
+    assert not {file[0] for file in one} & {file[0] for file in two}
+    assert {file[0] for file in one} == {"A", "C", "D"}  # dealt to the side with fewer
+    assert graded.halves(files) == (one, two)
