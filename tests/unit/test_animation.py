@@ -11,9 +11,11 @@ import pytest
 import repair
 from repair.cli.command import main
 from repair.errors import OutputError
+from repair.outcome.data import Drawing
 from repair.r157.cases import LENGTH, grid
 from repair.r157.motion import stated
 from repair.r157.scenario import scene_at
+from repair.report.film.drive import film_of_drive
 from repair.report.film.frames import animation, frames_of
 from repair.report.film.result import film_of_result
 
@@ -65,6 +67,40 @@ def test_the_panels_part_at_the_f_ttr(cut_in):
     assert "repaired, since" in figure.axes[1].get_title()
     (_, _), figure = egos(round(outcome.ttc / 0.1) + 1)
     assert "in conflict" in figure.axes[0].get_title()
+
+
+def test_a_drive_counts_down_says_what_is_done_and_stays_where_it_is_struck():
+    t = np.arange(21) * 0.1
+    lines = {"t": t, "plan_x": 10.0 * t, "x": np.minimum(10.0 * t, 5.0 + 4.0 * (t - 0.5))}
+    still = dict.fromkeys(("y", "orientation", "plan_y", "plan_orientation"), [0.0] * 21)
+    cycles = [
+        {"t": 0.0, "mode": "plan", "f_ttr": 0.5}, {"t": 0.4, "mode": "plan", "f_ttr": 0.1},
+        {"t": 0.5, "mode": "repair", "f_ttr": 0.0}, {"t": 1.2, "mode": "brake", "f_ttr": None},
+    ]  # fmt: skip
+    row = {
+        "file": "DEU_Somewhere-1_1_T-1.xml", "shift_s": 1.0, "prediction": "lane", "policy": "f_ttr",
+        "plan_contact_s": 1.04, "plan_contact_id": 7, "contact_s": 1.96, "contact_id": None,
+        "impact_speed_mps": 3.0, "first_intervention_s": 0.5,
+        "drive": {"dt": 0.1, "states": {k: list(v) for k, v in {**lines, **still}.items()}, "cycles": cycles},
+    }  # fmt: skip
+    body = np.array([[2.0, 1.0], [-2.0, 1.0], [-2.0, -1.0], [2.0, -1.0]])
+    drawing = Drawing(0.0, 0.0, 2.0, (20, 0), body, np.zeros((21, 3)), None, (), (), (), (), ())
+    film = film_of_drive(row, drawing)
+    planned, driven = film.panels
+    assert driven.titles[2] == "f_ttr: F-TTR in 0.30 s"
+    assert driven.titles[8] == "f_ttr: a repair is driven"
+    assert driven.titles[15] == "f_ttr: full braking"
+    assert driven.titles[20] == "f_ttr: contact at 3.0 m/s"
+    assert planned.titles[10:12] == ("as planned", "as planned, in contact")
+    assert film.opponent == 7
+    assert driven.mark == pytest.approx([5.0, 0.0])
+    assert "traffic 1 s later" in film.title
+    for k, (figure,) in ((k, frames_of(film, [k])) for k in (0, 20)):
+        left, right = (middle(axes.patches[-1]) for axes in figure.axes)
+        assert left == pytest.approx([min(1.0 * k, 11.0), 0.0])  # it stays where it was struck
+        assert right == pytest.approx([lines["x"][k], 0.0])
+        for axes in figure.axes:
+            assert axes.get_xlim()[0] < min(left[0], right[0]) < axes.get_xlim()[1]
 
 
 def test_a_gif_has_a_frame_for_each_step(cut_in):
