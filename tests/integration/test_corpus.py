@@ -154,6 +154,7 @@ def test_a_trajectory_into_an_obstacle(file: Path, monkeypatch: pytest.MonkeyPat
     assert {"trajectory", "official"} <= kinds(examine(file, replace(QUICK, invariance=False)))
 
 
+@pytest.mark.exhaustive
 def test_backends_that_do_not_agree(file: Path) -> None:
     """One that finds nothing; where others may be asked instead, they agree."""
     found = examine(file, Settings(("ego", "casadi"), ("constant",), invariance=False))

@@ -15,11 +15,11 @@ def files(scenarios: Path) -> tuple[Path, ...]:
 
 def test_nothing_breaks(files: tuple[Path, ...], tmp_path: Path) -> None:
     settings = Settings(files[:14], seed=7, keep=tmp_path / "broken")
-    outcomes = fuzz(range(60), settings)
-    assert len(outcomes) == 60
+    outcomes = fuzz(range(40), settings)
+    assert len(outcomes) == 40
     broken = [f"{o.index} {o.family} {o.name}: {o.detail}" for o in outcomes if o.word == BUG]
     assert not broken, f"{table(outcomes)}\n" + "\n".join(broken)
-    assert sum(o.word == "found" for o in outcomes) > 4  # some get all the way
+    assert sum(o.word == "found" for o in outcomes) > 2  # some get all the way
 
 
 def test_same_seed_same_files(files: tuple[Path, ...], tmp_path: Path) -> None:

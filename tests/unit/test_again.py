@@ -137,6 +137,7 @@ def test_a_narrowed_road_keeps_the_path():
     assert path_keeper.tightened(0.0, 0.3, 0.0).bounds is path_keeper.bounds
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize(
     "speed, without, said", [(16.0, "repair.narrow=[]", "m narrower"), (22.0, "repair.ease=[]", "unused")]
 )

@@ -209,7 +209,7 @@ def test_there_are_twenty():
     assert len(MUTATIONS) >= 20
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("mutate", MUTATIONS, ids=lambda m: m.__name__.strip("_"))
 def test_it_is_rejected_tampered(written, tmp_path, mutate):
     content = proofs(written)

@@ -125,6 +125,7 @@ def of_an_earlier_version(content):
     content["config"]["seed"] = 0
 
 
+@pytest.mark.exhaustive
 def test_a_result_of_an_earlier_version_is_certified_alike(written, folder):
     change(folder, of_an_earlier_version)
     (folder / "drawing.json").unlink()
@@ -167,7 +168,7 @@ def test_how_far_into_a_box_a_hard_repair_may_go_is_its_own_word(folder, earlier
     assert rows() == {(0.0, False)}
 
 
-@pytest.mark.thinned(4)
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("preset", ["scenario_1", "scenario_2"])
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 def test_what_a_preset_finds_is_certified(preset, backend, tmp_path):

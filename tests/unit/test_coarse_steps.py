@@ -33,6 +33,7 @@ def scenario_of(folder, road: str, dt: float, speed: float, beside: float = 0.0)
     return path
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("dt", [0.5, 1.0])
 @pytest.mark.parametrize("road", driven.ROADS)
 def test_own_references_are_drivable(tmp_path, road, dt):
@@ -42,6 +43,7 @@ def test_own_references_are_drivable(tmp_path, road, dt):
             assert verdict_of(scenario, source) == set(), (speed, source)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("dt", [0.5, 1.0])
 def test_the_way_onto_the_route_takes_steps_too(tmp_path, dt):
     for speed in (3.0, 8.0, 15.0):

@@ -56,7 +56,7 @@ def f_ttrs(folder: Path, traffic, road: str, backend: str, horizons, *settings: 
     return found
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_standing_car_on_one_lane(backend: str, tmp_path: Path) -> None:
     horizons = TENTHS[::3] if backend == "casadi" else TENTHS  # odd tenths and even ones; all: exhaustive

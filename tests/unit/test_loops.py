@@ -82,6 +82,7 @@ def test_a_ring_is_driven_as_often_as_the_horizon_needs(tmp_path: Path, radius: 
     assert found.prepared.t_reference == pytest.approx(duration, abs=0.11)
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("laps", [0.4, 1.0])
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 def test_who_stands_on_a_ring_is_met_on_every_lap(tmp_path: Path, backend: str, laps: float) -> None:

@@ -60,6 +60,7 @@ def test_without_the_setting_nobody_brakes(tmp_path: Path) -> None:
     assert noted.status.value == "no_conflict"
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_lane_that_ends_beside_one_that_goes_on(tmp_path: Path, backend: str, closed: bool) -> None:

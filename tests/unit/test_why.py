@@ -136,6 +136,7 @@ def test_who_crosses_a_little_later_is_no_obstacle(tmp_path):
     require_shown(situation, why)
 
 
+@pytest.mark.exhaustive
 def test_on_a_narrow_road_width_would_help(tmp_path):
     situation = prepared(
         written(tmp_path, standing(30, 44.0, 0.0, 4.0, 1.8), own=24.0, width=3.5), "explain.kinds=[road]"
