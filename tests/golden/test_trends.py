@@ -49,6 +49,7 @@ def with_speed(scene: Scene, speed: float) -> Scene:
     return scene_from_scenario(scene.scenario, problem)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     "backend, offsets",
     [
@@ -63,6 +64,7 @@ def test_a_larger_s_offset_lowers_both(scene: Scene, backend: str, offsets: tupl
     assert falling([r.f_ttr for r in results])
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("reference", ["planner", "constant"])
 def test_a_higher_initial_speed_lowers_both(scene: Scene, reference: str) -> None:
     results = [repaired(with_speed(scene, v), reference__source=reference) for v in (3.6, 4.2, 5.0, 6.0)]

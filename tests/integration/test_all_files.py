@@ -37,7 +37,7 @@ def repaired() -> dict[str, RepairResult]:
     return {}
 
 
-@pytest.mark.thinned(3)
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("name", names())
 def test_file(scenarios: Path, name: str, repaired: dict[str, RepairResult]) -> None:
     path = scenarios.parent / name

@@ -89,6 +89,7 @@ def told(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
     monkeypatch.setattr("repair.preparation.detect_conflict", other)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     "changes, kind",
     [
@@ -334,6 +335,7 @@ def answer_of(file: Path) -> set[str]:
     return kinds(examine(file, replace(QUICK, invariance=False)))
 
 
+@pytest.mark.exhaustive
 def test_a_few_situations_are_judged(road: Map, tmp_path: Path) -> None:
     for seed in range(3):
         file = tmp_path / f"{seed}.xml"

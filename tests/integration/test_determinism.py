@@ -60,6 +60,7 @@ def once(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[st
     return found
 
 
+@pytest.mark.exhaustive
 def test_twice_in_one_process(files: list[Path], once: dict[str, str], tmp_path: Path) -> None:
     for path in reversed(files):  # in another order: nothing may be left over from the file before
         repair(path).save(tmp_path / path.name, figure=False)

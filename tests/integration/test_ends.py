@@ -50,6 +50,7 @@ def _judge(seed: int, file: Path) -> None:
         assert fault(told, file), f"the judge sees nothing: {case.words}"
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("seed", range(2000, 2010))
 def test_what_is_called_safe_meets_nothing(seed: int, tmp_path: Path) -> None:
     """``python -m tests.ends --seeds 2000`` does it at length."""

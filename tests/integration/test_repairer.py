@@ -54,6 +54,7 @@ def test_the_first_cycle_is_a_repair(scene, backend):
     np.testing.assert_allclose(cycle.states.x, whole.states.x, atol=1e-9)
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 def test_the_time_left_runs_down_and_never_jumps_back(scene, backend):
     """The plan and the recording stay as they are: what was verified once is so until it is due."""

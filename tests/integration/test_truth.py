@@ -186,6 +186,7 @@ def test_what_makes_no_difference(
 # ------------------------------------------------------------------ what goes one way only
 
 
+@pytest.mark.exhaustive
 def test_more_clearance_is_never_a_later_conflict(write: Callable[[str], Path]) -> None:
     for seed in range(2000, 2006):
         file = write(crossing(seed).text)

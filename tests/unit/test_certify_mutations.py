@@ -317,6 +317,7 @@ def noticed(folder) -> str:
     return ""
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     "folder",
     ["casadi", "no_conflict", "ego", pytest.param("dev", marks=pytest.mark.scenarios)],
@@ -331,7 +332,7 @@ def test_an_honest_result_is_certified(folder):
     assert "judged under" in shown
 
 
-@pytest.mark.thinned(4)
+@pytest.mark.thinned(7)
 @pytest.mark.parametrize(
     "folder, mutation",
     [

@@ -72,6 +72,7 @@ def test_every_number_has_a_range():
     assert all(low is not None and high is not None for low, high in RANGES.values())
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize("key", sorted(WORDS))
 def test_every_choice_is_accepted_and_another_word_refused(key):
     several = KEYS[key].type.startswith("list")
@@ -86,6 +87,7 @@ def test_every_choice_is_accepted_and_another_word_refused(key):
             load_config(overrides={key: [WORDS[key][0], "nonsense"]})
 
 
+@pytest.mark.thinned(5)
 @pytest.mark.parametrize("key", sorted(RANGES))
 def test_every_range_is_closed(key):
     low, high = RANGES[key]

@@ -209,6 +209,7 @@ def test_given_from_the_command_line_is_a_sentence(path, capsys):
     assert "the argument reference=" in capsys.readouterr().err
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("form", ["t, x, y", "at other times", "a trajectory", "a curve"])
 def test_a_result_with_a_given_reference_is_certified(form, drive, scene, planned, tmp_path):
     thing = planned if form == "a curve" else FORMS[form](drive, scene)

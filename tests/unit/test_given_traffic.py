@@ -91,6 +91,7 @@ def goes_on(scene, **keys):
     return car(scene, ahead=15.0, speed=scene.initial_state.velocity, braking=2.0, mode="goes on", **keys)
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("backend", ["ego", "casadi", "qptr"])
 def test_a_repair_is_clear_of_every_mode(scene, backend):
     """The F-TTR of all modes is never above that of a single one, and the result says each."""

@@ -127,6 +127,7 @@ def test_a_start_without_velocity(kind: str, after: str, load: Load) -> None:
         assert any("stand still" in note for note in scene.notes)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("kind", ["trajectory", "nowhere a velocity", "sets", "no prediction"])
 def test_a_start_without_velocity_is_certified(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "ZAM_Test-1_1_T-1.xml"

@@ -47,6 +47,7 @@ def test_steady_circle_is_the_closed_form():
     assert states.speed == pytest.approx(4.0 * np.cos(slip), abs=1e-5)
 
 
+@pytest.mark.thinned(3)
 @VEHICLES
 def test_slip_follows_its_differential_equation_across_curvature_jumps(vehicle):
     def curvature(s):

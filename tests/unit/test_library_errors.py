@@ -501,6 +501,7 @@ def python(code, **environment):
     return subprocess.run(command, capture_output=True, text=True, env=full, timeout=300, check=False)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("backend", ["nonsense", "module://nowhere", "agg"])
 def test_figures_need_no_backend_of_matplotlib(backend, written):
     code = (

@@ -86,6 +86,7 @@ def test_one_pair_of_speeds_collides_as_often_as_published(case, ego, other, cou
         assert abs(made - count) <= 0.01 * count, name
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("reading", [True, False])
 @pytest.mark.parametrize("case, name", PAIRS)
 def test_the_fast_form_and_the_readable_one_agree(case, name, reading):

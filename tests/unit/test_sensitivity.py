@@ -30,7 +30,7 @@ def first():
     return sensitivity(1, variations=chosen(1, "preset", "reference.source", "ego.w_a"))
 
 
-@pytest.mark.thinned(2)
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("number", [1, 2])
 def test_every_variation_is_a_valid_one_that_differs_from_the_preset(number):
     def configured(overrides):

@@ -40,6 +40,7 @@ def again(first: Path, second: Path, *more: str) -> str:
     return stored(second)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_stored_result_runs_again_and_is_the_same(backend, tmp_path):
     """Also what was set on purpose and has no effect, of which a note tells."""

@@ -93,6 +93,7 @@ def left_turn(opened):
     return route(opened["scenario_1"].network, [101, 111, 103])
 
 
+@pytest.mark.thinned(4)
 @pytest.mark.parametrize(
     "acceleration, least, ttc",
     [
