@@ -203,6 +203,18 @@ def test_ctrl_c_ends_the_search_with_what_was_found():
     assert last.asked == []
 
 
+def test_ctrl_c_while_a_proof_is_looked_for_keeps_what_was_found():
+    class Stopped(TooLate):
+        def __call__(self, t_rep):
+            raise KeyboardInterrupt
+
+    last = Member("last", 9.0)
+    found, _ = asked(Member("first", 0.5), last, hopeless=Stopped(1.0))
+    assert found.f_ttr == pytest.approx(0.5)
+    assert not found.complete
+    assert last.asked == []
+
+
 def test_a_portfolio_of_itself_or_of_nobody_is_refused():
     for members in ("[portfolio]", "[]"):
         with pytest.raises(BackendError, match="at least one, and none of itself"):

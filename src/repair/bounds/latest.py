@@ -28,9 +28,7 @@ __all__ = ["Bound", "Proof", "Quick", "bound", "proof_at", "too_late"]
 
 _AROUND = 40.0  # where the edge of the road is looked at [m]
 _DENSE, _FINE, _COARSE = 0.3, 0.025, 0.05  # instants: how long they are dense, and how far apart they are [s]
-_FEW = (
-    5  # parts of a quick proof: 39 of 44 had one, 6 and more the others; what proves nothing takes them all
-)
+_FEW = 5  # parts of a quick proof: most have one, and what proves nothing takes them all
 
 
 @dataclass(frozen=True)

@@ -174,9 +174,13 @@ def _search_with(
         if best is not None:
             if late is not None and _open(visits, best, settings, end):
                 end, late = min(end, late()), None
-            left = _left(settings, begin)
-            if hopeless is not None and settings.proofs and _open(visits, best, settings, end):
-                end = min(end, _since(hopeless, _later(visits, best, settings, end), left))
+            try:  # an interrupt loses nothing that was found
+                if hopeless is not None and settings.proofs and _open(visits, best, settings, end):
+                    left = _left(settings, begin)
+                    end = min(end, _since(hopeless, _later(visits, best, settings, end), left))
+            except KeyboardInterrupt:
+                complete = False
+                break
             if not _open(visits, best, settings, end):
                 break
             visits = None if visits is None else _later(visits, best, settings, end)
