@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
+import os
+import shutil
+import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -114,6 +118,42 @@ def test_a_gif_has_a_frame_for_each_step(cut_in):
             abs(film.n_frames - steps) <= 1
         )  # the last one stays a second: equal frames are one longer frame
         assert film.info["duration"] == 100
+
+
+@pytest.mark.skipif(
+    shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None, reason="ffmpeg is not there"
+)
+def test_an_mp4_has_a_frame_for_each_step_and_plays_in_its_own_time(cut_in, tmp_path):
+    outcome, _ = cut_in
+    outcome = replace(outcome, drawing=replace(outcome.drawing, until=0.4))
+    (tmp_path / "film.mp4").write_bytes(animation(film_of_result(outcome), "mp4"))
+    said = "stream=codec_name,pix_fmt,width,height,nb_read_frames,avg_frame_rate,duration"
+    asked = ["ffprobe", "-v", "error", "-count_frames", "-show_entries", said, "-of", "json", "film.mp4"]
+    (film,) = json.loads(subprocess.run(asked, cwd=tmp_path, check=True, capture_output=True).stdout)[
+        "streams"
+    ]
+    assert (film["codec_name"], film["pix_fmt"], film["avg_frame_rate"]) == ("h264", "yuv420p", "10/1")
+    assert film["width"] % 2 == film["height"] % 2 == 0
+    assert int(film["nb_read_frames"]) == 5 + 10  # the last one stays a second
+    assert float(film["duration"]) == pytest.approx(1.5)
+    shown = ["ffmpeg", "-v", "error", "-i", "film.mp4", "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    raw = subprocess.run(shown, cwd=tmp_path, check=True, capture_output=True).stdout
+    frames = np.frombuffer(raw, np.uint8).reshape(-1, film["height"] * film["width"]).astype(float)
+    moved = np.abs(np.diff(frames, axis=0)).mean(axis=1)
+    assert (moved[:4] > 5.0 * moved[4:].max()).all()  # compression alone changes what stands still
+
+
+@pytest.mark.parametrize("last", ["exit 1", "cat > /dev/null; exit 1"], ids=["at once", "in the end"])
+def test_an_ffmpeg_that_makes_nothing_is_one_sentence(cut_in, tmp_path, monkeypatch, caplog, last):
+    outcome, _ = cut_in
+    outcome = replace(outcome, drawing=replace(outcome.drawing, until=0.4))
+    tool = tmp_path / "ffmpeg"
+    tool.write_text(f"#!/bin/sh\necho 'many words' >&2; echo 'Unknown encoder h264' >&2; {last}\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    with pytest.raises(OutputError, match=r"^ffmpeg made no film: Unknown encoder h264; a \.gif"):
+        animation(film_of_result(outcome), "mp4")
+    assert not caplog.records
 
 
 def test_what_is_no_film_is_refused(cut_in, tmp_path, capsys, monkeypatch):

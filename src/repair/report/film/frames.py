@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
+import subprocess
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -93,7 +96,7 @@ def animation(film: Film, file_format: str = "gif", progress: Callable[..., Any]
     Raises
     ------
     OutputError
-        If the format is unknown, or ffmpeg is not there.
+        If the format is unknown, or ffmpeg is not there, or makes no film.
     """
     import_matplotlib()
     from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -110,13 +113,32 @@ def animation(film: Film, file_format: str = "gif", progress: Callable[..., Any]
     figure, draw = _figure(film)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"film.{file_format}"
-        writer.setup(figure, str(file), _DPI)
         steps: Iterable[int] = shown if progress is None else progress(shown)
-        for k in steps:
-            draw(k)
-            writer.grab_frame()
-        writer.finish()
+        with _by_ffmpeg(writer) if file_format == "mp4" else nullcontext():
+            writer.setup(figure, str(file), _DPI)
+            for k in steps:
+                draw(k)
+                writer.grab_frame()
+            writer.finish()
         return file.read_bytes()
+
+
+@contextmanager
+def _by_ffmpeg(writer: Any) -> Iterator[None]:
+    """What ffmpeg complains of is one sentence, whether it ends at once or after the last frame."""
+    log = logging.getLogger("matplotlib.animation")
+    before, log.disabled = log.disabled, True  # it would show all that ffmpeg says
+    try:
+        try:
+            yield
+        except BrokenPipeError:
+            writer.finish()  # which says why
+            raise
+    except (OSError, subprocess.CalledProcessError) as error:
+        said = str(getattr(error, "stderr", None) or error).strip().splitlines()
+        raise OutputError(f"ffmpeg made no film: {said[-1]}; a .gif needs no ffmpeg") from error
+    finally:
+        log.disabled = before
 
 
 def frames_of(film: Film, steps: Iterable[int]) -> list[Any]:
