@@ -40,13 +40,18 @@ BACKENDS: dict[str, tuple[str, ...]] = {
 }
 
 
+def under(sources: Path, worker: str) -> subprocess.Popen[bytes]:
+    """A worker of this folder in a process of its own, with the sources of a folder."""
+    env = {**os.environ, "PYTHONPATH": str(sources)}
+    command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name(worker))]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=env)
+
+
 class Rebuilding:
     """A process that builds everything anew, under the sources of a folder."""
 
     def __init__(self, sources: Path, file: Path, backend: str, overrides: list[str]) -> None:
-        env = {**os.environ, "PYTHONPATH": str(sources)}
-        worker = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("rebuild_worker.py"))]
-        self._process = subprocess.Popen(worker, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=env)
+        self._process = under(sources, "rebuild_worker.py")
         self._send((str(file), backend, overrides))
 
     def _send(self, thing: Any) -> None:
