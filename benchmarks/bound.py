@@ -45,10 +45,14 @@ def certified(prepared, path: Path, bounds) -> list:
     start = float(states.orientation[0])
     reference = along_curve(prepared.reference, scene.frame, scene.vehicle, until, scene.dt, start)
     times = {kind: b.time if b.proven else None for kind, b in bounds.items()}
+    earliest = min((t for t in times.values() if t is not None), default=None)
     said = {
-        "kinds": {kind: {"t_bound_s": t} for kind, t in times.items()},
+        "kinds": {kind: {"t_bound_s": t, "status": bounds[kind].status} for kind, t in times.items()},
         "proof_file": PROOF_FILE,
-        "t_bound_s": min((t for t in times.values() if t is not None), default=None),
+        "t_bound_s": earliest,
+        "gap_s": None,
+        "proven_optimal": False,
+        "proven_too_late_at_start": earliest == 0.0,
     }
     content = {"bound": said, "f_ttr_s": None, "ttc_s": prepared.conflict.time}
     with tempfile.TemporaryDirectory() as folder:

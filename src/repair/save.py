@@ -224,7 +224,9 @@ def proof_file(result: Saved) -> Files:
     said = result.outcome.record.get("bound")
     if not any(bound.proven for bound in result.bounds.values()) or said is None:
         return Files({}, {}, (PROOF_FILE,))
-    return Files({PROOF_FILE: proof_bytes(result.bounds)}, {"bound": {**said, "proof_file": PROOF_FILE}})
+    proofs = proof_bytes(result.bounds)
+    named = {"proof_file": PROOF_FILE, "proof_sha256": hashlib.sha256(proofs).hexdigest()}
+    return Files({PROOF_FILE: proofs}, {"bound": {**said, **named}})
 
 
 FORMATS: Registry[Format] = Registry(

@@ -47,4 +47,5 @@ def bound_to_dict(
             for kind, b in bounds.items()
         },
         "proof_file": None,
+        "proof_sha256": None,
     }

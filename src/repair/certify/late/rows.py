@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
+import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -30,6 +32,9 @@ __all__ = ["late_rows"]
 _ROUNDING = 1e-6  # [m] by which a shape may be outside of what it stands for: files hold micrometres
 _STEP = 0.025  # over which the reference's acceleration is looked at [s]
 _NO_ROAD = -1  # stands in the file for what is none
+_NO_PROOF = (
+    KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, ZeroDivisionError,
+)  # fmt: skip
 _LARGEST = 50_000_000  # bytes of a proof: more is none
 
 
@@ -61,34 +66,47 @@ def late_rows(
     if not told:
         return []
     claims = {k: float(one["t_bound_s"]) for k, one in told["kinds"].items() if one["t_bound_s"] is not None}
-    proofs = _read(folder / str(told["proof_file"]))["kinds"] if claims else {}
+    proofs, written = _read(folder / str(told["proof_file"])) if claims else ({}, None)
     taken = _Taken(prepared, scenario, traffic)
     rows = []
     for kind, time in claims.items():
         name = f"too late from {time:g} s on ({kind})"
         try:
-            count = _holds(kind, time, proofs[kind], prepared, taken, reference)
+            count = _holds(kind, time, proofs["kinds"][kind], prepared, taken, reference)
         except Wrong as wrong:
             rows.append(said(name, False, "exact", str(wrong)))
-        except (KeyError, IndexError, TypeError, ValueError, OverflowError, ZeroDivisionError) as error:
+        except _NO_PROOF as error:
             rows.append(said(name, False, "exact", f"this is no proof: {type(error).__name__} {error}"))
         else:
             rows.append(said(name, True, "exact", f"{count} leaves"))
-    earliest, f_ttr = min(claims.values(), default=None), content.get("f_ttr_s")
+    rows.append(said("record: bound and gap", _consistent(content, claims, prepared), "files"))
+    if told.get("proof_sha256") is not None:  # results of before have none
+        rows.append(said("record: the proof's checksum", told["proof_sha256"] == written, "files"))
+    return rows
+
+
+def _consistent(content: Mapping[str, Any], claims: Mapping[str, float], prepared: Prepared) -> bool:
+    """Whether what is said of bound and gap follows from the times that are claimed."""
+    told, f_ttr = content["bound"], content.get("f_ttr_s")
+    earliest = min(claims.values(), default=None)
     kept = told["t_bound_s"] == earliest and (f_ttr is None or earliest is None or f_ttr < earliest)
+    kept &= told["proven_too_late_at_start"] == (earliest is not None and earliest <= 0.0)
+    kept &= all((one["status"] == "proven") == (kind in claims) for kind, one in told["kinds"].items())
     upper = min(v for v in (earliest, content["ttc_s"], math.inf) if v is not None)
-    if f_ttr is not None and math.isfinite(upper):
-        grid = float(prepared.config.search.delta_t)
-        kept &= abs(told["gap_s"] - (upper - f_ttr)) < 1e-6
-        kept &= told["proven_optimal"] == (upper - f_ttr <= grid + 1e-9)
-    return [*rows, said("record: bound and gap", bool(kept), "files")]
+    if f_ttr is None or not math.isfinite(upper):
+        return bool(kept) and told["gap_s"] is None and not told["proven_optimal"]
+    gap, grid = told["gap_s"], float(prepared.config.search.delta_t)
+    kept &= gap is not None and abs(gap - (upper - f_ttr)) < 1e-6
+    return bool(kept) and told["proven_optimal"] == (upper - f_ttr <= grid + 1e-9)
 
 
-def _read(file: Path) -> Any:
+def _read(file: Path) -> tuple[Any, str]:
+    """What a file of proofs holds, and its checksum."""
     try:
-        with gzip.open(file) as stream:
+        written = file.read_bytes()
+        with gzip.open(io.BytesIO(written)) as stream:
             text = stream.read(_LARGEST)
-        return json.loads(text)
+        return json.loads(text), hashlib.sha256(written).hexdigest()
     except (OSError, EOFError, ValueError, RecursionError) as error:
         raise RepairError(f"the proof {file} cannot be read: {error}") from error
 
@@ -195,7 +213,10 @@ class _Taken:
         import shapely
 
         obstacle = int(one["obstacle"])
-        shape = shapely.Polygon([(float(x) + start[0], float(y) + start[1]) for x, y in one["shape"]])
+        corners = [(float(x) + start[0], float(y) + start[1]) for x, y in one["shape"]]
+        if not all(math.isfinite(v) for corner in corners for v in corner):
+            raise Wrong("a shape has no place")
+        shape = shapely.Polygon(corners)
         if obstacle == _NO_ROAD:
             # the margin around the body does not count at the edge, and reaches farthest at its corners
             margin = math.sqrt(2.0) * self.prepared.config.checker.clearance if kind == "search" else 0.0

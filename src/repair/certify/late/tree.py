@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from operator import index
 from typing import Any
 
 from repair.certify.late.assumed import Assumed, Headings, headings
@@ -55,7 +56,7 @@ def leaves(m: Assumed, proof: Mapping[str, Any]) -> int:
     ------
     Wrong
         If it does not hold.
-    KeyError, IndexError, TypeError, ValueError
+    KeyError, IndexError, TypeError, ValueError, AttributeError
         If it is no proof at all.
     """
     instants = [float(t) for t in proof["instants_s"]]
@@ -88,7 +89,7 @@ def leaves(m: Assumed, proof: Mapping[str, Any]) -> int:
 def _place(m: Assumed, one: Mapping[str, Any], count: int) -> _Place:
     shape, corners = ([(float(x), float(y)) for x, y in one[name]] for name in ("shape", "corners"))
     low, high = map(float, one["headings"])
-    instant, pieces = int(one["instant"]), int(one["pieces"])
+    instant, pieces = index(one["instant"]), index(one["pieces"])
     if not 0 <= instant < count or not convex(shape) or not convex(corners) or not 1 <= pieces <= 1000:
         raise Wrong("forbidden places are no convex polygon at an instant")
     body = [(m.front, m.side), (-m.back, m.side), (-m.back, -m.side), (m.front, -m.side)]
@@ -99,7 +100,7 @@ def _place(m: Assumed, one: Mapping[str, Any], count: int) -> _Place:
 
 def _beyond(part: _Part, places: Sequence[_Place]) -> list[_Part]:
     """The parts beyond each side of forbidden places: in the order given, and not beyond the sides before."""
-    number, sides, children = int(part.said["cut"]), list(part.said["sides"]), part.said["children"]
+    number, sides, children = index(part.said["cut"]), list(part.said["sides"]), part.said["children"]
     place = places[number]
     k = place.instant
     low, high = part.low[k], part.high[k]
@@ -117,7 +118,7 @@ def _beyond(part: _Part, places: Sequence[_Place]) -> list[_Part]:
 
 def _halves(part: _Part, seen: Headings) -> list[_Part]:
     """The parts with the heading at an instant on either side of an angle; near it, it cannot be far off."""
-    k, at, children = int(part.said["split"]), float(part.said["at"]), part.said["children"]
+    k, at, children = index(part.said["split"]), float(part.said["at"]), part.said["children"]
     if not 0 <= k < len(part.low) or len(children) != 2:
         raise Wrong("headings are not split in two")
     turned = [abs(t - seen.turned[k]) + _SURE for t in seen.turned]
@@ -139,7 +140,7 @@ def _halves(part: _Part, seen: Headings) -> list[_Part]:
 def _row(m: Assumed, part: _Part, places: Sequence[_Place], seen: Headings, one: Sequence[Any]) -> Row:
     """A row of a leaf, which has to hold there."""
     if one[0] == "place":
-        number, side, sign, weight = int(one[1]), int(one[2]), int(one[3]), float(one[4])
+        number, side, sign, weight = index(one[1]), index(one[2]), index(one[3]), float(one[4])
         if (number, side, sign) not in part.rows:
             raise Wrong("a leaf uses a side that is not on the way to it")
         place = places[number]
@@ -150,7 +151,7 @@ def _row(m: Assumed, part: _Part, places: Sequence[_Place], seen: Headings, one:
         return Row(place.instant, False, sign * x, sign * y, sign * level, factor)
     if one[0] != "course":
         raise Wrong(f"a row about {one[0]!r}, of which nothing is known")
-    k, side, angle, weight = int(one[1]), int(one[2]), float(one[3]), float(one[4])
+    k, side, angle, weight = index(one[1]), index(one[2]), float(one[3]), float(one[4])
     low, high = part.low[k] - seen.slip[k], part.high[k] + seen.slip[k]
     if high - low >= math.pi - _SURE:
         raise Wrong("a course is bounded that may be any")
