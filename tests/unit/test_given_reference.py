@@ -76,6 +76,27 @@ def uneven(drive, scene):
     return np.column_stack([t, *(np.interp(t, values[:, 0], column) for column in values.T[1:])])
 
 
+def saying(*names):
+    """Return a form: a CommonRoad trajectory whose states say their position, and these."""
+
+    def form(drive, scene):
+        from commonroad.scenario.state import CustomState
+        from commonroad.scenario.trajectory import Trajectory
+
+        first, at = scene.initial_time_step, drive.every(4)
+        said = {"orientation": at.orientation, "velocity": at.speed}
+        states = [
+            CustomState(
+                time_step=first + k, position=np.array([at.x[k], at.y[k]]),
+                **{name: float(said[name][k]) for name in names},
+            )
+            for k in range(len(at))
+        ]  # fmt: skip
+        return Trajectory(first, states)
+
+    return form
+
+
 FORMS = {
     "t, x, y": lambda d, s: table(d)[:, :3],
     "t, x, y, yaw": lambda d, s: table(d)[:, :4],
@@ -86,6 +107,10 @@ FORMS = {
     "a mapping": lambda d, s: {"t": d.t, "x": d.x, "y": d.y, "v": d.speed},
     "driven states": lambda d, s: d,
     "a trajectory": trajectory,
+    "states of places": saying(),
+    "states of places and speeds": saying("velocity"),
+    "states of places and headings": saying("orientation"),
+    "a structured array": lambda d, s: np.rec.fromarrays(table(d).T, names="t,x,y,yaw,v"),
 }
 
 
@@ -138,6 +163,9 @@ WRONG = {
     "turned": (shifted(3, 0.2), "rad"),
     "faster": (shifted(4, 5.0), "m/s"),
     "a jump": (shifted(1, 2.0, slice(40, None)), "at time step 3"),
+    "a masked number": (lambda v: np.ma.masked_array(v, v == v[12, 1]), "x of sample 12 is not finite"),
+    "complex": (lambda v: v.astype(complex), "no real number"),
+    "one heading": (shifted(3, 0.5, slice(61, 62)), "at time step 6"),
     "a speed of its own": (shifted(4, 30.0, slice(60, 70)), "speed"),
 }
 
@@ -149,6 +177,48 @@ def test_what_is_wrong_is_named_with_its_place(what, drive, scene):
         repair.repair(scene, reference=change(table(drive)))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def changed(name, value, at=7):
+    def change(states):
+        setattr(states[at], name, value)
+
+    return change
+
+
+def uncertain():
+    from commonroad.common.util import Interval
+
+    return Interval(1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        (changed("velocity", None), "at time step 7 velocity is missing"),
+        (changed("velocity", np.nan), "at time step 7 velocity is not finite"),
+        (changed("velocity", uncertain()), "at time step 7 velocity is a Interval"),
+        (changed("position", np.array([1.0, 2.0, 3.0])), r"at time step 7 the position is of shape \(3,\)"),
+        (lambda states: states.pop(7), "goes from time step 6 to 8"),
+    ],
+)
+def test_states_that_are_no_exact_numbers_are_named(change, words, drive, scene):
+    thing = trajectory(drive, scene)
+    change(thing.state_list)
+    with pytest.raises(ReferenceTrajectoryError, match=words):
+        given_reference(thing, scene)
+
+
+def test_headings_of_who_stands_may_be_any(scene):
+    """A yaw that is taken from differences of positions jumps to 0 where the car stands."""
+    ego, t = scene.initial_state, np.arange(41) * 0.1
+    brake = 5.0
+    s = np.where(
+        t < ego.velocity / brake, ego.velocity * t - 0.5 * brake * t**2, 0.5 * ego.velocity**2 / brake
+    )
+    yaw = np.where(np.gradient(s) > 0.0, ego.orientation, 1.5)
+    x, y = ego.x + s * np.cos(ego.orientation), ego.y + s * np.sin(ego.orientation)
+    assert given_reference(np.column_stack([t, x, y, yaw]), scene).recording is not None
 
 
 @pytest.mark.parametrize(

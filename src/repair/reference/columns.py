@@ -11,9 +11,9 @@ from repair.errors import ReferenceTrajectoryError, in_words, kind_of
 from repair.timegrid import steps_until
 from repair.vehicle.states import DrivenStates
 
-__all__ = ["KEYS", "WHAT", "at_steps", "require_times", "table_of"]
+__all__ = ["COLUMNS", "KEYS", "WHAT", "at_steps", "require_times", "table_of"]
 
-_COLUMNS = ("t", "x", "y", "yaw", "v")
+COLUMNS = ("t", "x", "y", "yaw", "v")
 KEYS = ("t_s", "x_m", "y_m", "yaw_rad", "v_mps")  # as result.json has them
 _COARSEST = 0.5  # samples further apart than this, and than the scenario's step, say too little [s]
 _GAP = 1.5  # so many times the usual distance in time are a gap
@@ -26,25 +26,28 @@ def table_of(thing: Any) -> Array:
     """Columns t, x, y, yaw, v (N, 5), NaN where yaw or v are not said."""
     if isinstance(thing, DrivenStates):
         thing = {"t": thing.t, "x": thing.x, "y": thing.y, "yaw": thing.orientation, "v": thing.speed}
+    fields = getattr(getattr(thing, "dtype", None), "names", None)
+    if fields:  # a structured array
+        thing = {name: thing[name] for name in fields}
     if hasattr(thing, "keys") and hasattr(thing, "__getitem__"):
         names = [str(name) for name in thing.keys()]  # noqa: SIM118 - a table need not be a mapping
         if set(KEYS[:3]) <= set(names) <= set(KEYS):
-            columns = {name: thing[key] for name, key in zip(_COLUMNS, KEYS, strict=True) if key in names}
+            columns = {name: thing[key] for name, key in zip(COLUMNS, KEYS, strict=True) if key in names}
         else:
-            if strange := [name for name in names if name not in _COLUMNS]:
+            if strange := [name for name in names if name not in COLUMNS]:
                 raise ReferenceTrajectoryError(
                     f"{WHAT} has {in_words(strange[0])}; its columns are t, x, y and, if known, yaw and v"
                 )
             columns = {name: thing[name] for name in names}
     else:
         values = _numbers(thing, "")
-        if values.ndim != 2 or not 3 <= values.shape[1] <= len(_COLUMNS):
+        if values.ndim != 2 or not 3 <= values.shape[1] <= len(COLUMNS):
             raise ReferenceTrajectoryError(
                 f"{WHAT} is {_shape(thing, values)}; an array has a row for each sample and the columns "
                 "t, x, y[, yaw[, v]]"
             )
-        columns = dict(zip(_COLUMNS, values.T, strict=False))
-    if missing := [name for name in _COLUMNS[:3] if name not in columns]:
+        columns = dict(zip(COLUMNS, values.T, strict=False))
+    if missing := [name for name in COLUMNS[:3] if name not in columns]:
         raise ReferenceTrajectoryError(f"{WHAT} has no column {missing[0]}; it needs t, x and y")
     read = {name: _numbers(values, f"column {name} of ") for name, values in columns.items()}
     count = len(np.atleast_1d(read["t"]))
@@ -55,15 +58,22 @@ def table_of(thing: Any) -> Array:
             )
         if wrong := np.flatnonzero(~np.isfinite(values)).tolist():
             raise ReferenceTrajectoryError(f"{WHAT}: {name} of sample {wrong[0]} is not finite")
-    table = np.full((count, len(_COLUMNS)), np.nan)
+    table = np.full((count, len(COLUMNS)), np.nan)
     for name, values in read.items():
-        table[:, _COLUMNS.index(name)] = values
+        table[:, COLUMNS.index(name)] = values
     return table
 
 
 def _numbers(thing: Any, what: str) -> Array:
+    """Floats, NaN where an array is masked."""
     try:
-        return np.asarray(thing, dtype=np.float64)
+        made = np.asarray(thing)
+        if made.dtype.kind in "cmM":  # NumPy would drop the imaginary part, or count a date's ticks
+            raise TypeError(f"{made.dtype} is no real number")
+        made = made.astype(np.float64)
+        if np.ma.isMaskedArray(thing):
+            made[np.ma.getmaskarray(thing)] = np.nan
+        return made
     except (TypeError, ValueError) as error:
         raise ReferenceTrajectoryError(
             f"{what}{WHAT} cannot be read as numbers: {kind_of(thing)} ({in_words(error)}); a reference is "

@@ -28,6 +28,7 @@ __all__ = [
     "Recording",
     "require_consistent",
     "require_start",
+    "require_turns",
 ]
 
 POSITION_OFF = 0.03
@@ -42,6 +43,7 @@ START_SPEED_OFF = 2.0
 """The first speed may be off the ego's by this [m/s]."""
 SPEED_MAX = 150.0
 """Faster than this a recording jumps [m/s]."""
+_CRAWLS = 0.1  # a step shorter than this has no direction of its own [m]
 
 
 @dataclass(frozen=True)
@@ -207,15 +209,24 @@ def _velocities(recording: Recording, dt: float) -> None:
 
 def _turns(recording: Recording, dt: float, vehicle: Vehicle) -> None:
     """How far the body turns in a step, against what steering and friction allow."""
-    turned = np.abs(wrap(np.diff(recording.headings)))
     moved = np.hypot(*np.diff(recording.positions, axis=0).T)
-    speed = np.abs(recording.speeds[:-1])
+    most = _most_turned(recording.positions, np.abs(recording.speeds[:-1]), dt, vehicle)
+    _require_turned(recording, moved, most)
+
+
+def _most_turned(positions: Array, speed: Array, dt: float, vehicle: Vehicle) -> Array:
+    """How far a heading may change in each step (K - 1,) [rad]."""
+    moved = np.hypot(*np.diff(positions, axis=0).T)
     steered = 2.0 * (speed + vehicle.a_max * dt) * vehicle.steering_rate_max / vehicle.wheelbase * dt**2
     most = np.minimum(
         vehicle.largest_curvature() * (moved + POSITION_OFF),
         vehicle.a_max * dt / np.maximum(speed, 1e-6) + steered,  # friction counts at the start of a step
     )
-    most = most + HEADING_OFF
+    return np.asarray(most + HEADING_OFF)
+
+
+def _require_turned(recording: Recording, moved: Array, most: Array) -> None:
+    turned = np.abs(wrap(np.diff(recording.headings)))
     _first(
         recording,
         turned - most,
@@ -225,6 +236,29 @@ def _turns(recording: Recording, dt: float, vehicle: Vehicle) -> None:
         ),
         1,
     )
+
+
+def require_turns(recording: Recording, dt: float, vehicle: Vehicle) -> None:
+    """Refuse headings, as directions of the centre's path, that turn faster than the vehicle can be driven.
+
+    While it crawls they are not looked at: a direction that is taken from positions says nothing then.
+
+    Parameters
+    ----------
+    recording : Recording
+    dt : float
+        Time step [s].
+    vehicle : Vehicle
+
+    Raises
+    ------
+    ReferenceTrajectoryError
+        The sentence names the first time step.
+    """
+    moved = np.hypot(*np.diff(recording.positions, axis=0).T)
+    # The direction of the centre is off the body's by a slip angle, which changes as fast as the steering.
+    most = _most_turned(recording.positions, moved / dt, dt, vehicle) + 2.0 * vehicle.steering_rate_max * dt
+    _require_turned(recording, moved, np.where(moved < _CRAWLS, np.inf, most))
 
 
 def _along_and_across(recording: Recording) -> tuple[Array, Array]:

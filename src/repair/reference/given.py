@@ -17,13 +17,14 @@ from repair.curves.base import Curve
 from repair.curves.codec import curve_to_dict, read_curve
 from repair.errors import ReferenceTrajectoryError, foreign
 from repair.reference.base import Track
-from repair.reference.columns import KEYS, WHAT, at_steps, require_times, table_of
+from repair.reference.columns import COLUMNS, KEYS, WHAT, at_steps, require_times, table_of
 from repair.reference.consistency import (
     START_OFF,
     START_SPEED_OFF,
     Recording,
     require_consistent,
     require_start,
+    require_turns,
 )
 from repair.reference.fit import fit_recording
 from repair.reference.recorded import states_of
@@ -92,7 +93,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
         - an array (N, 3), (N, 4) or (N, 5) with the columns ``t, x, y[, yaw[, v]]``;
         - a mapping (or table) with these names, each (N,);
         - a ``commonroad.scenario.trajectory.Trajectory`` of any state type, which begins at the planning
-          problem's initial time step;
+          problem's initial time step; states need say no more than their position;
         - driven states, such as those of an earlier result;
         - a :class:`repair.curves.base.Curve` in the scene's own frame.
 
@@ -117,7 +118,11 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
     if isinstance(thing, Curve):
         return _of_curve(thing, scene)
     if hasattr(thing, "state_list"):
-        return _of_trajectory(thing, scene)
+        made = _states_of(thing, scene.initial_time_step, scene)
+        if np.isfinite(made.speeds).all() and np.isfinite(made.directions).any():
+            return _of_trajectory(made, scene)
+        columns = zip(COLUMNS, _table_of_states(made, scene.dt).T, strict=True)
+        thing = {name: values for name, values in columns if not np.isnan(values).all()}
     table = _rounded(table_of(thing))  # as result.json has it: who runs that again follows the same
     require_times(table[:, 0], scene.dt)
     fine = _recording(table, scene, "by its own samples, ")
@@ -154,11 +159,7 @@ def given_start(thing: Any, scene: Scene) -> InitialState:
         If it cannot be read.
     """
     if hasattr(thing, "state_list"):
-        with foreign("reading the given trajectory", ReferenceTrajectoryError):
-            made = states_of(list(thing.state_list), WHAT, int(thing.state_list[0].time_step), scene.vehicle)
-        table = np.column_stack(
-            [np.arange(len(made.positions)) * scene.dt, made.positions, made.headings, made.speeds]
-        )
+        table = _table_of_states(_states_of(thing, None, scene), scene.dt)
     else:
         table = _rounded(table_of(thing))  # as result.json has it: who runs that again follows the same
     require_times(table[:, 0], scene.dt)
@@ -202,6 +203,7 @@ def _require_one_drive(made: Recording, t: Array, vehicle: Vehicle) -> None:
     except ReferenceTrajectoryError as error:
         try:
             require_consistent(replace(made, rear=0.0), dt, vehicle)
+            require_turns(made, dt, vehicle)
         except ReferenceTrajectoryError:
             raise error from None
 
@@ -234,18 +236,30 @@ def _require_start(made: Recording, scene: Scene) -> None:
     require_start(made, start.x, start.y, start.orientation, start.velocity)
 
 
-def _of_trajectory(trajectory: Any, scene: Scene) -> GivenReference:
-    """A CommonRoad trajectory: its states are looked at as those of a solution file are."""
+def _states_of(trajectory: Any, first: int | None, scene: Scene) -> Recording:
+    """The states of a CommonRoad trajectory, which begins at step ``first``, or at any."""
     with foreign("reading the given trajectory", ReferenceTrajectoryError):
-        made = states_of(list(trajectory.state_list), WHAT, scene.initial_time_step, scene.vehicle)
-        made = replace(  # result.json, which is read again, has columns t to v, of so many digits
-            made, velocities=None, positions=_rounded(made.positions),
-            headings=_rounded(made.headings), speeds=_rounded(made.speeds),
-        )  # fmt: skip
+        states = list(trajectory.state_list)
+        first = int(states[0].time_step) if first is None else first
+        return states_of(states, WHAT, first, scene.vehicle)
+
+
+def _table_of_states(made: Recording, dt: float) -> Array:
+    """States as columns t, x, y, yaw, v (N, 5)."""
+    t = np.arange(len(made.positions)) * dt
+    return np.column_stack([t, made.positions, made.headings, made.speeds])
+
+
+def _of_trajectory(made: Recording, scene: Scene) -> GivenReference:
+    """A CommonRoad trajectory: its states are looked at as those of a solution file are."""
+    made = replace(  # result.json, which is read again, has columns t to v, of so many digits
+        made, velocities=None, positions=_rounded(made.positions),
+        headings=_rounded(made.headings), speeds=_rounded(made.speeds),
+    )  # fmt: skip
     _require_start(made, scene)
     require_consistent(made, scene.dt, scene.vehicle)
-    table = [np.arange(len(made.positions)) * scene.dt, *made.positions.T, made.headings, made.speeds]
-    plain = {k: column(v, 12) for k, v in zip(KEYS, table, strict=True) if np.isfinite(v).all()}
+    table = _table_of_states(made, scene.dt)
+    plain = {k: column(v, 12) for k, v in zip(KEYS, table.T, strict=True) if np.isfinite(v).all()}
     return GivenReference(made, None, plain)
 
 

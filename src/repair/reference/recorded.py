@@ -18,7 +18,7 @@ import numpy as np
 from repair.arrays import Array, wrap
 from repair.curves.base import Curve
 from repair.curves.plane import STANDSTILL
-from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError
+from repair.errors import ConfigError, ReferenceTrajectoryError, ScenarioError, kind_of
 from repair.reference.base import Track
 from repair.reference.consistency import START_HEADING_OFF, Recording, require_consistent, require_start
 from repair.reference.fit import between_steps, fit_recording
@@ -219,10 +219,13 @@ def _vehicle_of(solution: Any, usual: Vehicle) -> Vehicle:
 def states_of(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Recording:
     """The states of a solution from step ``first`` on, one for each step.
 
+    Speeds and headings that no state says are NaN.
+
     Raises
     ------
     ReferenceTrajectoryError
-        If they begin elsewhere in time, have a gap, come twice, or hold a number that is none.
+        If they begin elsewhere in time, have a gap, come twice, hold a number that is none or is uncertain,
+        or say less than the first of them does.
     """
     steps = [int(state.time_step) for state in states]
     if steps[0] != first:
@@ -237,15 +240,38 @@ def states_of(states: list[Any], what: str, first: int, vehicle: Vehicle) -> Rec
             wrong = f"goes from time step {k} to {following}"
             wrong = f"has time step {k} twice" if following == k else wrong
             raise ReferenceTrajectoryError(f"{what} {wrong}; a reference has one state for each step")
-    for state in states:
-        for name, value in vars(state).items():
-            if value is not None and not np.isfinite(np.asarray(value, dtype=np.float64)).all():
-                raise ReferenceTrajectoryError(f"{what}: at time step {state.time_step} {name} is not finite")
+    _require_numbers(states, what)
     rows = np.array([_motion_of(state) for state in states], dtype=np.float64)
     positions = np.array([state.position for state in states], dtype=np.float64)
-    behind = vehicle.rear if hasattr(states[0], "orientation") and not _slips(states[0]) else 0.0
+    said = getattr(states[0], "orientation", None) is not None
+    behind = vehicle.rear if said and not _slips(states[0]) else 0.0
     velocities = _velocities(states, rows, vehicle, behind)
     return Recording(what, first, positions, rows[:, 0], rows[:, 1], rows[:, 2], behind, velocities)
+
+
+def _require_numbers(states: list[Any], what: str) -> None:
+    """Refuse the first state that holds what is no number, or that lacks what the first one has."""
+    said = {name for name, value in vars(states[0]).items() if value is not None}
+    for state in states:
+        place = f"{what}: at time step {state.time_step}"
+        for name, value in vars(state).items():
+            if value is None:
+                if name in said:
+                    raise ReferenceTrajectoryError(f"{place} {name} is missing")
+                continue
+            try:
+                numbers = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise ReferenceTrajectoryError(
+                    f"{place} {name} is {kind_of(value)}; the states of a reference are exact numbers"
+                ) from error
+            if not np.isfinite(numbers).all():
+                raise ReferenceTrajectoryError(f"{place} {name} is not finite")
+        if missing := sorted(said - vars(state).keys()):
+            raise ReferenceTrajectoryError(f"{place} {missing[0]} is missing")
+        if np.shape(state.position) != (2,):
+            shape = np.shape(state.position)
+            raise ReferenceTrajectoryError(f"{place} the position is of shape {shape}; it is x, y")
 
 
 def _velocities(states: list[Any], rows: Array, vehicle: Vehicle, behind: float) -> Array:
@@ -264,8 +290,11 @@ def _slips(state: Any) -> bool:
 
 def _motion_of(state: Any) -> tuple[float, float, float]:
     """Direction of motion, speed, and heading of the body; of a point mass the direction is all there is."""
-    forward, across = float(state.velocity), float(vars(state).get("velocity_y") or 0.0)
+    velocity, sideways = getattr(state, "velocity", None), vars(state).get("velocity_y")
+    forward, across = np.nan if velocity is None else float(velocity), float(sideways or 0.0)
     heading = vars(state).get("orientation")
+    if heading is None and sideways is None:
+        return np.nan, forward, np.nan
     if heading is None:
         speed = float(np.hypot(forward, across))
         direction = float(np.arctan2(across, forward)) if speed > 0.0 else np.nan
