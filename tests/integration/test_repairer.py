@@ -245,12 +245,53 @@ def test_threads_do_not_meet(scene):
     assert together == [*alone, *alone]
 
 
-def test_it_can_be_pickled(scene):
+def test_pickled_on_the_way_it_goes_on_as_it_would_have(scene):
+    """With the repair that it has found, too."""
     watch = repair.Repairer(scene)
-    watch.update(plan(scene))
+    for k in range(2):
+        watch.update(plan(scene, k * scene.dt), now=k * scene.dt)
     again = pickle.loads(pickle.dumps(watch))
-    fresh = repair.Repairer(scene)
-    assert again.update(plan(scene, 0.1), now=0.1).f_ttr == fresh.update(plan(scene, 0.1), now=0.1).f_ttr
+    answers = [
+        [one.update(plan(scene, k * scene.dt), now=k * scene.dt) for k in range(2, 6)]
+        for one in (watch, again)
+    ]
+    assert any(cycle.kept for cycle in answers[0])
+    for usual, other in zip(*answers, strict=True):
+        assert (other.status, other.ttc, other.f_ttr, other.kept) == (
+            usual.status, usual.ttc, usual.f_ttr, usual.kept,
+        )  # fmt: skip
+        assert not other.rebuilt
+
+
+def test_what_each_mode_alone_would_allow(scene):
+    """By a search for each, when asked; those below the threshold are nobody."""
+    ego = scene.initial_state
+    axis = np.array([np.cos(ego.orientation), np.sin(ego.orientation)])
+
+    def stands(ahead, probability):
+        place = [*(np.array([ego.x, ego.y]) + ahead * axis), ego.orientation]
+        poses = np.tile(place, (scene.n_steps + 1, 1))
+        return repair.Prediction(7, poses, 4.5, 1.8, probability=probability, mode=f"{ahead:g} m")
+
+    modes = [stands(40.0, 0.9), stands(30.0, 0.1)]
+    watch = repair.Repairer(scene, overrides=["search.rule=scan"])
+    cycle = watch.update(plan(scene), traffic=modes)
+    far, near = watch.modes(cycle)
+    assert (far.name, far.probability, near.name) == ("40 m", 0.9, "30 m")
+    assert near.ttc == cycle.ttc < far.ttc
+    assert cycle.f_ttr <= near.f_ttr <= far.f_ttr
+    likely = watch.update(plan(scene), traffic=modes, threshold=0.5)
+    assert likely.ttc == far.ttc
+    assert [mode.name for mode in watch.modes(likely)] == ["40 m"]
+    assert watch.modes(watch.update(plan(scene))) == ()
+
+
+def test_numbers_of_numpy_are_numbers(scene):
+    watch = repair.Repairer(scene)
+    cycle = watch.update(plan(scene), now=np.int64(0), deadline=np.float32(60.0))
+    assert cycle.status == "found"
+    with pytest.raises(ConfigError, match="the deadline is True"):
+        watch.update(plan(scene), deadline=True)
 
 
 WRONG = {
@@ -276,6 +317,12 @@ WRONG = {
         lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, probability=2.0)]},
         ScenarioError, "its probability is 2.0",
     ),
+    "no chance at all": (  # which would not be above any threshold
+        lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, probability=np.nan)]},
+        ScenarioError, "its probability is nan",
+    ),
+    "a threshold": (lambda s: {"traffic": [], "threshold": 2.0}, ScenarioError, "from 0 to below 1"),
+    "a threshold of nobody": (lambda s: {"threshold": 0.2}, ConfigError, "none is given"),
     "no poses": (
         lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 2)), 4.0, 2.0)]}, ScenarioError, "of shape"
     ),
@@ -302,6 +349,7 @@ def test_what_is_wrong_is_a_sentence_and_no_end(what, scene):
         (5, {}, "not a int"),
         ("nowhere.xml", {}, "no such file"),
         (None, {"backend": "foo"}, "foo"),
+        (None, {"planning_problem": 3}, "belongs to a CommonRoad scenario"),
         (None, {"overrides": ["driver=at_ttr"]}, "driver=at_ttr"),
     ],
 )

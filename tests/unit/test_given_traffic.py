@@ -11,7 +11,7 @@ from tests import roads
 import repair
 from repair.certify.certificate import format_certificate
 from repair.certify.recompute import certify
-from repair.errors import ScenarioError
+from repair.errors import ConfigError, ScenarioError
 
 CONSTANT = ["reference.source=constant", "search.rule=scan"]
 
@@ -77,6 +77,59 @@ def test_sets_are_kept_clear_of(scene):
     assert found.status == "found"
 
 
+def test_a_body_of_any_shape(scene):
+    """A rectangle by its size, as CommonRoad's, and by its corners is the same; a circle is one."""
+    from commonroad.geometry.shape import Circle, Rectangle
+
+    poses = of(scene, 30.0, 0.0)
+    corners = np.array([[2.25, 0.9], [-2.25, 0.9], [-2.25, -0.9], [2.25, -0.9]])
+    alike = [{"length": 4.5, "width": 1.8}, {"shape": Rectangle(4.5, 1.8)}, {"shape": corners}]
+    found = [answer(scene, [repair.Prediction(7, poses, **keys)]) for keys in alike]
+    assert len({one.f_ttr for one in found}) == 1
+    contacts = [one.search.conflict.contact_time for one in found]
+    np.testing.assert_allclose(contacts, contacts[0], atol=2e-3)
+    # A metre of the body more towards the ego, and none behind: it turns about its pose.
+    longer = answer(scene, [repair.Prediction(7, poses, shape=corners - (1.0, 0.0) * (corners < 0.0))])
+    sooner = contacts[0] - longer.search.conflict.contact_time
+    assert sooner == pytest.approx(1.0 / scene.initial_state.velocity, abs=5e-3)
+    pole = answer(scene, [repair.Prediction(7, poses, shape=Circle(0.9), kind="pillar")])
+    later = pole.search.conflict.contact_time - contacts[0]
+    assert later == pytest.approx((2.25 - 0.9) / scene.initial_state.velocity, abs=5e-3)
+
+
+def test_boxes_that_grow_are_sets(scene):
+    """An uncertainty that grows: as boxes with their sizes, and as the polygons that these are."""
+    poses = of(scene, 40.0, 0.0)
+    sizes = np.column_stack([4.5 + 0.5 * np.arange(len(poses)), np.full(len(poses), 1.8)])
+    (grows,) = repair.predictions_of(np.concatenate([poses, sizes], axis=1)[None], ids=[5])
+    assert grows.occupancies is not None
+    found = answer(scene, [grows])
+    stays = answer(scene, [repair.Prediction(5, poses, 4.5, 1.8)])
+    assert found.search.conflict.obstacle_id == 5
+    assert found.ttc < stays.ttc
+
+
+def test_sets_of_several_parts_that_come_later(scene):
+    from commonroad.geometry.shape import Circle
+
+    poses = of(scene, 30.0, 0.0)
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    parts = [[row[:2] + square, row[:2] + square + (200.0, 0.0)] for row in poses]
+    whole = answer(scene, [repair.Prediction(3, occupancies=parts)])
+    alone = answer(scene, [repair.Prediction(3, occupancies=[first for first, _ in parts])])
+    assert whole.ttc == alone.ttc
+    late = answer(scene, [repair.Prediction(3, occupancies=[None] * 30 + parts[30:])])
+    assert late.ttc == pytest.approx(3.0, abs=0.11)
+    circles = [Circle(1.0, row[:2]) for row in poses]
+    assert answer(scene, [repair.Prediction(3, occupancies=circles)]).ttc == pytest.approx(alone.ttc, abs=0.1)
+
+
+def test_a_chance_that_is_no_number_hides_nobody(scene):
+    """NaN is above no threshold: the obstacle would be left out."""
+    with pytest.raises(ScenarioError, match="its probability is nan"):
+        answer(scene, [car(scene, ahead=30.0, speed=0.0, probability=np.nan)])
+
+
 def test_who_comes_later_is_not_there_before(scene):
     early, late = (answer(scene, [car(scene, ahead=30.0, speed=0.0, late=k)]) for k in (0, 30))
     assert early.ttc < late.ttc
@@ -139,6 +192,12 @@ def test_improbable_modes_are_left_out_and_said(scene):
     other = repair.with_traffic(scene, modes, threshold=0.05)
     assert len(other.obstacles) == 1
     assert any("brakes (0.02)" in note for note in other.notes)
+    assert answer(scene, modes, threshold=0.05).f_ttr == answer(scene, modes[1:]).f_ttr
+    with pytest.raises(ConfigError, match="none is given"):
+        repair.repair(scene, threshold=0.05)
+
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
 def hole(poses):
@@ -156,6 +215,12 @@ WRONG = {
     "hole": (lambda s: [repair.Prediction(1, hole(of(s, 20.0, 0.0)), 4, 2)], "at step 5"),
     "never": (lambda s: [repair.Prediction(1, np.full((5, 3), np.nan), 4, 2)], "no pose of it"),
     "kind": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, kind="tank")], "no kind 'tank'"),
+    "unknown": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, probability="a")], "is 'a'"),
+    "a letter": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), "a", 2)], "'a' and 2"),
+    "two shapes": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, shape=[[0, 0]] * 3)], "either a"),
+    "no shape": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), shape="round")], "neither one of"),
+    "away": (lambda s: [repair.Prediction(1, occupancies=[SQUARE, None, SQUARE])], "at step 1 it is nowhere"),
+    "a size of sets": (lambda s: [repair.Prediction(1, length=4, occupancies=[SQUARE] * 3)], "leave shape"),
     "likely": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, probability=2)], "probability"),
     "twice": (lambda s: [*s.scenario.obstacles, *s.scenario.obstacles], "obstacle"),
     "a line": (lambda s: [repair.Prediction(1, occupancies=[[[0, 0], [1, 1]]] * 3)], "no polygon"),
@@ -179,7 +244,9 @@ def test_what_is_no_traffic_is_a_sentence(what, scene):
         (np.zeros((2, 4, 3)), {"length": [1, 2, 3], "width": 1}, "do not fit"),
         (np.zeros((2, 4, 5)), {"length": 1}, "leave length"),
         (np.zeros((2, 4, 3)), {"length": 1, "width": 1, "ids": [1]}, "1 ids"),
-        (np.arange(40.0).reshape(2, 4, 5), {}, "changes over time"),
+        (np.arange(40.0).reshape(2, 4, 5) - 13.0, {}, "obstacle 1 has no size at step 0"),
+        (np.zeros((1, 4, 3)), {"length": "a", "width": 1}, "do not fit"),
+        (np.zeros((1, 4, 3)), {"length": 1, "width": 1, "ids": 5}, "the ids of"),
     ],
 )
 def test_boxes_that_are_none(boxes, keys, words):

@@ -44,6 +44,7 @@ def repair(
     on_explaining: Callable[[str], None] | None = None,
     reference: Any = None,
     traffic: Iterable[Any] | None = None,
+    threshold: float | None = None,
     **keys: Any,
 ) -> RepairResult:
     """Find the F-TTR and the repaired trajectory of a scenario.
@@ -63,6 +64,9 @@ def repair(
         earlier result (:func:`repair.reference.given.given_reference`); or the name of a source or a file.
     traffic : iterable, optional
         All other traffic there is, from memory, instead of the scenario's; see :func:`repair.with_traffic`.
+    threshold : float, optional
+        Of several predictions of one obstacle among ``traffic``, those less probable than this number are
+        left out.
     **keys
         Configuration keys where no ``config`` is given: ``preset=``, ``backend=``, ``overrides=``.
 
@@ -85,13 +89,15 @@ def repair(
     elif not isinstance(config, Config):
         raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
     require_types(config)
+    if threshold is not None and traffic is None:
+        raise ConfigError("threshold is about the modes of traffic=, and none is given")
     backend = make(config)
     phases = Phases()
     with phases("load"):
         scene = scenario if isinstance(scenario, Scene) else load_scene(scenario, config)
     if traffic is not None:
         with phases("load"):
-            scene = with_traffic(scene, traffic)
+            scene = with_traffic(scene, traffic, threshold=0.0 if threshold is None else threshold)
     if isinstance(reference, RepairResult):
         reference = reference.states
     elif isinstance(reference, Outcome):

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from repair.api import RepairResult
+from repair.api import RepairResult, find
 from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.config.load import load_config
 from repair.config.schema import Config
 from repair.curves.base import Curve, SplicedCurve
+from repair.cycle.asked import Asked, Others, require_deadline, since, spare, step_of
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
 from repair.cycle.kept import KeptRepair, verified_again
@@ -29,14 +30,15 @@ from repair.cycle.ready import made_ready
 from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
-from repair.errors import ConfigError, ReferenceTrajectoryError, in_words, kind_of
+from repair.errors import ConfigError, ReferenceTrajectoryError, kind_of
 from repair.outcome.data import Outcome
-from repair.preparation import Prepared, laid_out
+from repair.preparation import Prepared, among, laid_out
 from repair.reference.given import GivenReference, given_reference
 from repair.scene.commonroad import moved_on
 from repair.scene.reframe import lanes_at, reframe
 from repair.scene.road.lanes import Lane
 from repair.scene.scene import Scene
+from repair.search.modes import ModeResult, each_mode
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT
@@ -83,12 +85,12 @@ class Repairer:
         self.config = source
         self.scene = scene_of(road, planning_problem, config)
         self._first = self.scene
-        self._start()
+        self._start_with(source)
 
-    def _start(self) -> None:
+    def _start_with(self, config: Config) -> None:
         """What is made on the way."""
         self._lanes: Mapping[int, Lane] | None = None
-        self._backend = made_ready(self.config)
+        self._backend = made_ready(config)
         self._paces: dict[str, Pace] = {}
         self._framed: Scene | None = None
         self._room = 0.0
@@ -96,15 +98,41 @@ class Repairer:
         self._kept: KeptRepair | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"config": self.config, "scene": self.scene, "_first": self._first}
+        """All but what is made again: the solver's structures, the checker, and how fast this machine is."""
+        kept = ("config", "scene", "_first", "_framed", "_room", "_kept")
+        return {name: self.__dict__[name] for name in kept}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        self._start_with(state["config"])
         self.__dict__.update(state)
-        self._start()
 
     def reset(self) -> None:
         """Forget what was found: the next cycle is a first one."""
         self._kept = None
+
+    def modes(self, cycle: Cycle) -> tuple[ModeResult, ...]:
+        """What each mode alone would allow, of obstacles that were given several predictions.
+
+        A search for each of them, without a deadline: no part of the cycle.
+
+        Parameters
+        ----------
+        cycle : Cycle
+            An answer of this Repairer.
+
+        Returns
+        -------
+        tuple of ModeResult
+            None is below the F-TTR of the cycle, which serves all of them; empty where nobody has several.
+        """
+        if cycle.prepared is None:
+            return ()
+        prepared = cycle.prepared
+        found = replace(cycle.search, status=cycle.status, f_ttr=cycle.f_ttr)
+        return each_mode(
+            prepared.scene.modes, prepared.scene.obstacles, found,
+            lambda traffic: find(among(prepared, traffic), self._backend, settings=self.config.search),
+        )  # fmt: skip
 
     def warm(self, reference: Any, *, traffic: Iterable[Any] | None = None, ego: Any = None) -> None:
         """Ask what the first cycles will ask, without a deadline, and forget the answers.
@@ -137,6 +165,7 @@ class Repairer:
         ego: Any = None,
         now: float = 0.0,
         deadline: float | None = None,
+        threshold: float | None = None,
     ) -> Cycle:
         """Repair the plan of this cycle.
 
@@ -157,6 +186,9 @@ class Repairer:
         deadline : float, optional
             The answer is there within so many seconds [s] from the call on: the best that was verified by
             then, in this cycle or an earlier one.
+        threshold : float, optional
+            Of several predictions with one id, its modes, those less probable than this number are left
+            out; 0 by default. With ``traffic`` only.
 
         Returns
         -------
@@ -168,8 +200,8 @@ class Repairer:
             If something cannot be used; what was kept stays as it was.
         """
         begin = time.perf_counter()
-        if deadline is not None and not (isinstance(deadline, int | float) and deadline > 0.0):
-            raise ConfigError(f"the deadline is {in_words(deadline)}; it has to be positive [s]")
+        require_deadline(deadline)
+        others = Others.of(traffic, threshold)
         if isinstance(reference, RepairResult | Cycle):
             reference = reference.states
         elif isinstance(reference, Outcome):
@@ -180,26 +212,28 @@ class Repairer:
             )
         if isinstance(reference, Curve):
             raise ReferenceTrajectoryError("a Repairer takes places on the plane, and not a curve in a frame")
-        at = None if deadline is None else begin + deadline - _spare(deadline)
-        asked = _Asked(now, self._step(now), begin, at, Paced(paces=self._paces))
+        at = None if deadline is None else begin + deadline - spare(deadline)
+        asked = Asked(now, step_of(now, self.scene.dt), begin, at, Paced(paces=self._paces))
         try:
-            prepared = self._prepared(reference, traffic, ego, asked)
+            prepared = self._prepared(reference, others, ego, asked)
         except OutOfTime:
             conflict = Conflict(np.nan, contact_time=np.nan, exact_time=np.nan)
             nothing = SearchResult(SearchStatus.BUDGET_EXHAUSTED, conflict, None, None, complete=False)
-            return Cycle(now, None, nothing, None, None, False, False, asked.told, _since(begin))
+            return Cycle(now, None, nothing, None, None, False, False, asked.told, since(begin))
         return self._answered(prepared, asked)
 
     # -- parts of a cycle --------------------------------------------------------------------------------
 
-    def _prepared(self, reference: Any, traffic: Iterable[Any] | None, ego: Any, asked: _Asked) -> Prepared:
+    def _prepared(self, reference: Any, others: Others, ego: Any, asked: Asked) -> Prepared:
         """The plan among the traffic, and until when it can be followed."""
         phases = asked.phases
         with until(asked.at):
             with phases("plan"):
                 state = ego_of(ego, reference, self.scene)
             with phases("traffic"):
-                scene = scene_now(self.scene, self._first, asked.step, state, traffic)
+                scene = scene_now(
+                    self.scene, self._first, asked.step, state, others.traffic, others.threshold
+                )
             with phases("given"):
                 given = given_reference(reference, scene)
         before = self._framed
@@ -210,7 +244,7 @@ class Repairer:
         self._checker = prepared.checker
         return prepared
 
-    def _answered(self, prepared: Prepared, asked: _Asked) -> Cycle:
+    def _answered(self, prepared: Prepared, asked: Asked) -> Cycle:
         """What was kept, if it still holds, and what is found beside it."""
         kept, refuted, phases = None, False, asked.phases
         found = SearchResult(
@@ -243,7 +277,7 @@ class Repairer:
     def _source(self, prepared: Prepared) -> Any:
         return prepared.unguided if self._backend.capabilities.own_way else prepared.source
 
-    def _limited(self, asked: _Asked) -> SearchConfig:
+    def _limited(self, asked: Asked) -> SearchConfig:
         settings = self.config.search
         if asked.at is None:
             return settings
@@ -252,16 +286,6 @@ class Repairer:
         if left <= 0.0:
             raise OutOfTime
         return replace(settings, time_limit=min(left, settings.time_limit or left))
-
-    def _step(self, now: float) -> int:
-        if not (isinstance(now, int | float) and np.isfinite(now) and now >= 0.0):
-            raise ConfigError(
-                f"now is {in_words(now)}; it is a time from the planning problem's start on [s]"
-            )
-        step = round(now / self.scene.dt)
-        if abs(step * self.scene.dt - now) > INSTANT * max(1.0, now):
-            raise ConfigError(f"now is {now:g} s; it has to be a multiple of the step of {self.scene.dt:g} s")
-        return step
 
     def _frame(self, scene: Scene, given: GivenReference, rebuilt: list[str]) -> tuple[Scene, Checker | None]:
         """The scene in a frame along the plan: the kept one where the plan is on its path, else a new one."""
@@ -295,7 +319,7 @@ class Repairer:
 
     def _answer(
         self, prepared: Prepared, found: SearchResult, kept: tuple[float, Curve] | None, refuted: bool,
-        asked: _Asked,
+        asked: Asked,
     ) -> Cycle:  # fmt: skip
         f_ttr, part = found.f_ttr, found.curve
         conflicting = found.status not in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING)
@@ -311,31 +335,5 @@ class Repairer:
             self._kept = None
         return Cycle(
             asked.now, prepared, found, f_ttr, curve, is_kept, found.complete, asked.told,
-            _since(asked.begin),
+            since(asked.begin),
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """A cycle that is asked for: when it begins [s] and at which step, since when and until when [s]."""
-
-    now: float
-    step: int
-    begin: float
-    at: float | None
-    phases: Paced
-    rebuilt: list[str] = field(default_factory=list)
-
-    @property
-    def told(self) -> tuple[str, ...]:
-        """What was laid out anew."""
-        return tuple(self.rebuilt)
-
-
-def _since(begin: float) -> float:
-    return time.perf_counter() - begin
-
-
-def _spare(deadline: float) -> float:
-    """What is left for making the answer of what was found [s]."""
-    return min(5e-4, 0.1 * deadline)

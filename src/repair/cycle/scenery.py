@@ -11,11 +11,12 @@ import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.config.schema import Config
-from repair.errors import ScenarioError, kind_of
+from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.scene.commonroad import load_scene, scene_from_scenario
 from repair.scene.scene import InitialState, Scene
-from repair.scene.traffic.given_rows import given_obstacles
+from repair.scene.traffic.given.rows import given_obstacles
 from repair.scene.traffic.obstacle import Obstacle, later
+from repair.scene.traffic.prediction import Mode
 from repair.timegrid import INSTANT, steps_until
 
 __all__ = ["fits", "in_frame", "scene_now", "scene_of"]
@@ -27,18 +28,24 @@ _HORIZON = 10.0  # unless ``scene.horizon`` says another [s]
 
 def scene_of(road: Any, planning_problem: Any, config: Config) -> Scene:
     """The scene of whatever a road is given as."""
-    if isinstance(road, Scene):
-        return road
     if hasattr(road, "lanelet_network"):
         return scene_from_scenario(road, planning_problem, config)
+    if planning_problem is not None:
+        raise ConfigError(
+            "planning_problem belongs to a CommonRoad scenario; a scene has its own, and of a file it is the "
+            "key scene.planning_problem"
+        )
+    if isinstance(road, Scene):
+        return road
     if not isinstance(road, str | Path):
         raise ScenarioError(f"a road is a scene, a path or a CommonRoad scenario, not {kind_of(road)}")
     return load_scene(road, config)
 
 
 def scene_now(
-    base: Scene, recorded: Scene, step: int, ego: InitialState, traffic: Iterable[Any] | None
-) -> Scene:
+    base: Scene, recorded: Scene, step: int, ego: InitialState, traffic: Iterable[Any] | None,
+    threshold: float = 0.0,
+) -> Scene:  # fmt: skip
     """The scene of a cycle, on the road's own frame.
 
     Parameters
@@ -51,6 +58,7 @@ def scene_now(
         When the cycle begins.
     ego : InitialState
     traffic : iterable, optional
+    threshold : float
         See :meth:`repair.Repairer.update`.
 
     Raises
@@ -60,6 +68,7 @@ def scene_now(
     """
     first = recorded.initial_time_step + step
     notes: list[str] = []
+    modes: tuple[Mode, ...] = ()
     if traffic is None:
         obstacles: tuple[Obstacle, ...] = tuple(
             o for o in (later(o, step) for o in recorded.obstacles) if o is not None
@@ -71,8 +80,8 @@ def scene_now(
                 f"the scenario's own traffic ends at {end:g} s, and now is {step * base.dt:g} s"
             )
     else:
-        obstacles, n_steps, notes = given_obstacles(
-            base.scenario, first, traffic,
+        obstacles, n_steps, modes, notes = given_obstacles(
+            base.scenario, first, traffic, threshold=threshold,
             after_prediction=base.settings.after_prediction,
             steps_max=steps_until(base.settings.horizon or _HORIZON, base.dt),
         )  # fmt: skip
@@ -80,6 +89,7 @@ def scene_now(
     return replace(
         base, initial_state=ego, start=start, obstacles=obstacles, n_steps=n_steps,
         horizon=n_steps * base.dt, initial_time_step=first, recorded_ego=None, notes=tuple(notes),
+        modes=modes,
     )  # fmt: skip
 
 

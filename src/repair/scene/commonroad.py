@@ -26,7 +26,7 @@ from repair.scene.scene import InitialState, Scene
 from repair.scene.settings import SceneConfig
 from repair.scene.speed_signs import speed_limit_along
 from repair.scene.start import first_step_of, initial_state_of, is_ego
-from repair.scene.traffic.given import given_scenario
+from repair.scene.traffic.given.scenario import given_scenario
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.settings import keys_of, require_type
 from repair.timegrid import steps_until

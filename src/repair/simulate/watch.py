@@ -14,6 +14,7 @@ from repair.arrays import frozen
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
+from repair.cycle.asked import step_of
 from repair.cycle.kept import KeptRepair, verified_again
 from repair.cycle.repairer import Repairer
 from repair.cycle.searching import searched
@@ -110,7 +111,7 @@ class Watch(Repairer):
         scene = replace(
             base, initial_state=ego, start=frozen([at.position[0], at.velocity[0], at.acceleration[0]]),
             obstacles=traffic.obstacles, n_steps=traffic.n_steps, horizon=traffic.n_steps * base.dt,
-            initial_time_step=base.initial_time_step + self._step(now), recorded_ego=None, notes=(),
+            initial_time_step=base.initial_time_step + step_of(now, base.dt), recorded_ego=None, notes=(),
             first_heading=ego.orientation,
         )  # fmt: skip
         prepared = laid_out(

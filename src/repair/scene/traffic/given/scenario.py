@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
 from repair.arrays import Array
 from repair.errors import ScenarioError, foreign, in_words, kind_of
+from repair.scene.traffic.given.shapes import body_of, sets_of
 from repair.scene.traffic.prediction import WHAT as _WHAT
-from repair.scene.traffic.prediction import Mode, Prediction, name_of, size_of
+from repair.scene.traffic.prediction import Mode, Prediction, name_of
+from repair.scene.traffic.shapes import outlines
 
 __all__ = ["given_scenario", "known_rows", "speeds_along", "standing_as"]
 
@@ -56,8 +58,7 @@ def given_scenario(
 
     if isinstance(traffic, str | bytes) or not hasattr(traffic, "__iter__"):
         raise ScenarioError(f"{_WHAT} has to be a list of obstacles or predictions, not {kind_of(traffic)}")
-    if not 0.0 <= threshold < 1.0:
-        raise ScenarioError(f"the threshold of modes is {threshold!r}; it has to be from 0 to below 1")
+    require_threshold(threshold)
     made = Scenario(
         old.dt, old.scenario_id, author=old.author or "", tags=old.tags or set(),
         affiliation=old.affiliation or "", source="", location=old.location,
@@ -93,6 +94,7 @@ def standing_as(
     for p in predictions:
         if not isinstance(p.id, Integral) or isinstance(p.id, bool) or p.id < 1:
             raise ScenarioError(f"{_WHAT}: an obstacle's id is a positive whole number, not {in_words(p.id)}")
+        require_probability(p, name_of(p))
     following = max([_FAR, *roads, *(int(p.id) for p in predictions)]) + 1
     chosen: list[tuple[int, Prediction]] = []
     modes: list[Mode] = []
@@ -126,7 +128,6 @@ def _obstacle(prediction: Prediction, name: int, first: int, dt: float) -> Any:
     what = name_of(prediction)
     if (prediction.poses is None) == (prediction.occupancies is None):
         raise ScenarioError(f"{what}: either poses or occupancies are given")
-    require_probability(prediction, what)
     with foreign(what, ScenarioError):
         if prediction.poses is None:
             return _set_based(prediction, name, first, what)
@@ -168,8 +169,23 @@ def require_probability(prediction: Prediction, what: str) -> None:
     ScenarioError
         With what it is.
     """
-    if not 0.0 <= prediction.probability <= 1.0:
-        raise ScenarioError(f"{what}: its probability is {prediction.probability!r}")
+    known: Any = prediction.probability
+    if not (isinstance(known, Real) and 0.0 <= float(known) <= 1.0):
+        raise ScenarioError(f"{what}: its probability is {in_words(known)}, and no number from 0 to 1")
+
+
+def require_threshold(threshold: Any) -> None:
+    """Refuse a threshold of modes that is none.
+
+    Raises
+    ------
+    ScenarioError
+        With what it is.
+    """
+    if not (isinstance(threshold, Real) and 0.0 <= float(threshold) < 1.0):
+        raise ScenarioError(
+            f"the threshold of modes is {in_words(threshold)}; it has to be from 0 to below 1"
+        )
 
 
 def known_rows(poses: Any, what: str) -> tuple[int, Array]:
@@ -192,18 +208,19 @@ def known_rows(poses: Any, what: str) -> tuple[int, Array]:
 
 
 def _moving(prediction: Prediction, name: int, first: int, dt: float, what: str) -> Any:
-    from commonroad.geometry.shape import Rectangle
     from commonroad.prediction.prediction import TrajectoryPrediction
     from commonroad.scenario.obstacle import DynamicObstacle
     from commonroad.scenario.state import CustomState, InitialState
     from commonroad.scenario.trajectory import Trajectory
 
-    length, width = size_of(prediction)
+    shape, middle = body_of(prediction, what)
     begin, rows = known_rows(prediction.poses, what)
     rows = rows.copy()  # they are the caller's
     rows[:, 2] = np.arctan2(np.sin(rows[:, 2]), np.cos(rows[:, 2]))
-    shape = Rectangle(length, width)
     speed = speeds_along(rows, dt)
+    cos, sin = np.cos(rows[:, 2]), np.sin(rows[:, 2])
+    rows[:, 0] += middle[0] * cos - middle[1] * sin
+    rows[:, 1] += middle[0] * sin + middle[1] * cos
     start = InitialState(
         time_step=first + begin, position=rows[0, :2], orientation=float(rows[0, 2]),
         velocity=float(speed[0]), acceleration=0.0, yaw_rate=0.0, slip_angle=0.0,
@@ -231,25 +248,20 @@ def speeds_along(rows: Array, dt: float) -> Array:
 
 
 def _set_based(prediction: Prediction, name: int, first: int, what: str) -> Any:
-    from commonroad.geometry.shape import Polygon
     from commonroad.prediction.prediction import Occupancy, SetBasedPrediction
     from commonroad.scenario.obstacle import DynamicObstacle
     from commonroad.scenario.state import InitialState
 
-    outlines = [np.asarray(outline, dtype=np.float64) for outline in prediction.occupancies or ()]
-    for k, outline in enumerate(outlines):
-        if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3 or not np.isfinite(outline).all():
-            raise ScenarioError(
-                f"{what}: its occupancy at step {k} is no polygon (V, 2) of three corners or more"
-            )
-    if len(outlines) < 2:
-        raise ScenarioError(f"{what}: it has {len(outlines)} occupancies; one for each step is expected")
-    centre = outlines[0].mean(axis=0)
+    if not (prediction.shape is prediction.length is prediction.width is None):
+        raise ScenarioError(f"{what}: occupancies have their own shapes; leave shape, length and width out")
+    begin, sets = sets_of(prediction, what)
+    first += begin
+    middle = np.mean(np.concatenate(outlines(sets[0], np.zeros(2), 0.0)), axis=0)
     start = InitialState(
-        time_step=first, position=centre, orientation=0.0, velocity=0.0, acceleration=0.0, yaw_rate=0.0,
+        time_step=first, position=middle, orientation=0.0, velocity=0.0, acceleration=0.0, yaw_rate=0.0,
         slip_angle=0.0,
     )  # fmt: skip
-    sets = [Occupancy(first + k, Polygon(outline)) for k, outline in enumerate(outlines) if k]
-    shape = Polygon(outlines[0] - centre)
-    known = SetBasedPrediction(first + 1, sets)
+    later = [Occupancy(first + k, area) for k, area in enumerate(sets) if k]
+    shape = sets[0].translate_rotate(-middle, 0.0)
+    known = SetBasedPrediction(first + 1, later)
     return DynamicObstacle(name, _type(prediction.kind, what), shape, start, known)

@@ -10,25 +10,26 @@ import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.errors import ScenarioError, foreign
-from repair.scene.traffic.given import (
+from repair.scene.traffic.given.scenario import (
     given_scenario,
     known_rows,
     require_kind,
-    require_probability,
+    require_threshold,
     speeds_along,
     standing_as,
 )
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
-from repair.scene.traffic.prediction import Prediction, name_of, size_of
+from repair.scene.traffic.prediction import Mode, Prediction, name_of, size_of
 from repair.scene.traffic.rows import outline_of
 
 __all__ = ["given_obstacles"]
 
 
 def given_obstacles(
-    old: Any, first_step: int, traffic: Iterable[Any], *, after_prediction: str, steps_max: int
-) -> tuple[tuple[Obstacle, ...], int, list[str]]:
+    old: Any, first_step: int, traffic: Iterable[Any], *, after_prediction: str, steps_max: int,
+    threshold: float = 0.0,
+) -> tuple[tuple[Obstacle, ...], int, tuple[Mode, ...], list[str]]:  # fmt: skip
     """The obstacles of a cycle.
 
     Parameters
@@ -38,17 +39,21 @@ def given_obstacles(
     first_step : int
         Time step of the first row.
     traffic : iterable
-        As in :func:`repair.scene.traffic.given.given_scenario`, all modes included.
+        As in :func:`repair.scene.traffic.given.scenario.given_scenario`.
     after_prediction : str
         ``remove``, ``hold`` or ``constant_velocity``.
     steps_max : int
         Longer than this nothing is looked at.
+    threshold : float
+        Modes less probable than this are left out.
 
     Returns
     -------
     obstacles : tuple of Obstacle
     n_steps : int
         Until the last prediction, or ``steps_max`` where nothing moves or obstacles stay.
+    modes : tuple of Mode
+        Of the obstacles that have several.
     notes : list of str
 
     Raises
@@ -60,18 +65,18 @@ def given_obstacles(
     if hasattr(traffic, "__iter__") and not isinstance(traffic, str | bytes):
         things = list(traffic)
     plain = after_prediction == "remove" and isinstance(things, list)
-    if not plain or not all(isinstance(p, Prediction) and p.occupancies is None for p in things):
-        scenario, _, notes = given_scenario(old, first_step, things, 0.0)
+    if not plain or not all(isinstance(p, Prediction) and p.occupancies is p.shape is None for p in things):
+        scenario, modes, notes = given_scenario(old, first_step, things, threshold)
         last = last_predicted_step(scenario)
         ends = last is not None and last > first_step and after_prediction == "remove"
         n_steps = min(last - first_step, steps_max) if ends and last is not None else steps_max
         found, _, more = obstacles_of(
             scenario, first_step=first_step, n_steps=n_steps, after_prediction=after_prediction
         )
-        return found, n_steps, [*notes, *more]
-    chosen, _, notes = standing_as(things, 0.0, set())
+        return found, n_steps, modes, [*notes, *more]
+    require_threshold(threshold)
+    chosen, modes, notes = standing_as(things, threshold, set())
     for _, one in chosen:
-        require_probability(one, name_of(one))
         require_kind(one.kind, name_of(one))
     rows = [
         _Row(name, one, size_of(one), table)
@@ -79,7 +84,7 @@ def given_obstacles(
     ]
     longest = max((len(row.table) for row in rows), default=0) - 1
     n_steps = min(longest, steps_max) if longest > 0 else steps_max
-    return _of_tables(rows, n_steps, float(old.dt)), n_steps, notes
+    return _of_tables(rows, n_steps, float(old.dt)), n_steps, modes, notes
 
 
 class _Row(NamedTuple):
