@@ -7,11 +7,12 @@ chosen backend. A preset uses ``for_backend`` where a published setting belongs 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from repair.config.layers import Layer, dotted, explain, merged, read_yaml, require_sections, result_in
+from repair.config.layers import Layer, dotted, explain, lay_over, read_yaml, require_sections, result_in
 from repair.config.schema import Config, configuration_keys, key_names, schema, values_of, words_of
 from repair.errors import ConfigError, in_words, path_of
 from repair.settings import require_sane
@@ -121,12 +122,15 @@ def _resolved(layers: list[Layer], own: list[Layer]) -> Config:
     """Layers laid over each other, those that the user gave on purpose last."""
     from omegaconf import OmegaConf
 
-    found = keys = schema()
+    keys = schema()
     for layer in (*layers, *own):
         require_sections(layer, keys)
+    found = deepcopy(keys)
     for layer in (*layers, *own):
-        found = merged(layer.name, found, layer.node, known=key_names)
-    config = _validated(_with_backend_section(found, own))
+        if layer.node:
+            lay_over(layer.name, found, layer.node, known=key_names)
+    _with_backend_section(found, own)
+    config = _validated(found)
     config.given = frozenset(name for layer in own for name in _leaves(OmegaConf.to_container(layer.node)))
     return config
 
@@ -144,7 +148,7 @@ def _leaves(node: Any, prefix: str = "") -> Iterator[str]:
             yield f"{prefix}{name}"
 
 
-def _with_backend_section(found: Any, explicit: list[Layer]) -> Any:
+def _with_backend_section(found: Any, explicit: list[Layer]) -> None:
     """Lay ``for_backend.<backend>`` over the rest, and what the user said explicitly over that."""
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
@@ -155,12 +159,12 @@ def _with_backend_section(found: Any, explicit: list[Layer]) -> Any:
         raise ConfigError(explain("configuration", error, key_names())) from error
     found.for_backend = {}
     if section is None:
-        return found
+        return
     name = f"for_backend.{found.backend}"
     if not OmegaConf.is_dict(section):
         raise ConfigError(f"configuration key {name!r} is {section!r}; it must hold a mapping of keys")
     require_sections(Layer(name, section), schema())
-    return merged(name, found, section, *(layer.node for layer in explicit), known=key_names)
+    lay_over(name, found, section, *(layer.node for layer in explicit), known=key_names)
 
 
 def _validated(found: Any) -> Config:
