@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -109,7 +110,7 @@ def steps_of(value: Any) -> tuple[int, int]:
     low, high = getattr(value, "start", value), getattr(value, "end", value)
     if not (abs(low) <= STEPS_MAX and abs(high) <= STEPS_MAX):
         raise ScenarioError(f"a time step of an obstacle is beyond {STEPS_MAX}")
-    return int(np.floor(low)), int(np.ceil(high))
+    return math.floor(low), math.ceil(high)
 
 
 def timeline(obstacle: Any, first: int, last: int) -> tuple[dict[int, Placed], str]:
