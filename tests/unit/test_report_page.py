@@ -197,8 +197,10 @@ def test_the_page_of_one_result(tmp_path, capsys):
 
 
 _DRIVEN = """<script>
-window.addEventListener("error", (event) => { document.title = "ERROR " + event.message; });
-window.addEventListener("unhandledrejection", (event) => { document.title = "ERROR " + event.reason; });
+const tell = (found) => parent.postMessage(JSON.stringify(found), "*");
+window.addEventListener("error", (event) => tell({ error: event.message }));
+window.addEventListener("unhandledrejection", (event) => tell({ error: String(event.reason) }));
+console.error = (...words) => tell({ error: words.join(" ") });
 window.addEventListener("load", async () => {
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   const body = () => [...document.querySelectorAll("#rows tbody tr")].map((row) => row.cells[2].textContent);
@@ -219,10 +221,27 @@ window.addEventListener("load", async () => {
   const filter = document.getElementById("filter");
   filter.value = "QPTR";
   filter.dispatchEvent(new Event("input"));
-  document.body.dataset.found = JSON.stringify({ said, curve, before, sorted, kept: body(),
-    title: document.title,
-    wide: document.documentElement.scrollWidth - document.documentElement.clientWidth });
+  const kept = body(), page = document.documentElement;
+  const plots = () => [...document.querySelectorAll(".js-plotly-plot")].map((place) =>
+    [place.id, place.querySelector(".main-svg").getBoundingClientRect().width, place.style.height]);
+  const screen = plots();
+  document.getElementById("plot-v").style.width = "900px"; // as on a wide screen
+  await Plotly.Plots.resize("plot-v");
+  window.dispatchEvent(new Event("beforeprint"));
+  const paper = plots();
+  window.dispatchEvent(new Event("afterprint"));
+  document.getElementById("plot-v").style.width = "";
+  await Plotly.Plots.resize("plot-v");
+  tell({ said, curve, before, sorted, kept, screen, paper, after: plots(),
+    width: page.clientWidth, wide: page.scrollWidth - page.clientWidth });
 });
+</script></body>"""
+
+
+_TELEPHONE = """<!DOCTYPE html><body>
+<iframe src="driven.html" style="width: 390px; height: 800px; border: 0"></iframe>
+<script>
+window.addEventListener("message", (event) => { document.body.dataset.found ??= event.data; });
 </script></body>"""
 
 
@@ -230,22 +249,30 @@ window.addEventListener("load", async () => {
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
 def test_in_a_browser(stored, tmp_path):
     page = (stored / "report.html").read_text("utf-8")
-    driven = tmp_path / "driven.html"
-    driven.write_text(page.replace("</body>", _DRIVEN), encoding="utf-8")
+    (tmp_path / "driven.html").write_text(page.replace("</body>", _DRIVEN), encoding="utf-8")
+    frame = tmp_path / "frame.html"  # Chromium's own window is never as narrow
+    frame.write_text(_TELEPHONE, encoding="utf-8")
     argv = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu",
-            f"--user-data-dir={tmp_path / 'profile'}", "--window-size=390,800",
-            "--virtual-time-budget=60000", "--dump-dom", driven.as_uri()]  # fmt: skip
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--virtual-time-budget=60000", "--dump-dom", frame.as_uri()]  # fmt: skip
     done = subprocess.run(argv, capture_output=True, text=True, timeout=300, check=True)
     told = re.search(r'data-found="(.*?)"', done.stdout)
-    assert told is not None, re.search(r"<title>(.*?)</title>", done.stdout)
+    assert told is not None
     found = json.loads(told.group(1).replace("&quot;", '"').replace("&gt;", ">"))
-    assert not found["title"].startswith("ERROR")
+    assert "error" not in found
     assert found["said"][0] != found["said"][1]
     assert found["curve"][0] != found["curve"][1]
     assert found["before"] == ["ego", "qptr"]
     assert found["sorted"] == ["qptr", "ego"]
     assert found["kept"] == ["qptr"]
+    assert found["width"] <= 390
     assert found["wide"] <= 0  # nothing hangs over at the width of a telephone
+    assert len(found["screen"]) == 12
+    # On paper no figure is cut, however wide the screen was; then all is as it was.
+    most = {name: 961.0 if name == "plot-bird" else 471.0 for name, _, _ in found["paper"]}
+    assert all(width <= most[name] for name, width, _ in found["paper"])
+    assert {name: width for name, width, _ in found["paper"]}["plot-v"] > 460.0
+    assert found["after"] == found["screen"]
 
 
 _MANY = """<script>

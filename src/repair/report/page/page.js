@@ -13,7 +13,21 @@
   const jobs = [];
   const later = () => setTimeout(() => { if (jobs.length) { jobs.shift()(); later(); } }, 0);
   const all = () => { while (jobs.length) jobs.shift()(); };
-  window.addEventListener("beforeprint", () => { all(); shownRows = Infinity; fill(); });
+  // On paper everything is there, and a figure no wider than its place on the sheet.
+  window.addEventListener("beforeprint", () => {
+    all();
+    shownRows = Infinity;
+    fill();
+    zoomed((place) => Math.min(1, (place.closest(".full") ? 960 : 470) / place.clientWidth));
+  });
+  window.addEventListener("afterprint", () => zoomed(() => ""));
+  function zoomed(by) {
+    for (const place of document.querySelectorAll(".js-plotly-plot")) {
+      const zoom = by(place);
+      place.firstElementChild.style.zoom = zoom;
+      place.style.height = zoom === "" ? place.dataset.height : parseFloat(place.dataset.height) * zoom + "px";
+    }
+  }
 
   // A figure with as much room below it as its legend takes.
   function drawn(id, traces, layout) {
@@ -21,7 +35,7 @@
     const longest = Math.max(...named.map((each) => each.name.length), 1);
     const across = Math.max(Math.floor(place.clientWidth / (60 + 6.5 * longest)), 1);
     const below = 50 + (layout.showlegend === false ? 0 : 19 * Math.ceil(named.length / across));
-    place.style.height = (place.closest(".full") ? 420 : 270) + below + "px";
+    place.dataset.height = place.style.height = (place.closest(".full") ? 420 : 270) + below + "px";
     const margin = Object.assign({}, base.margin, { b: below });
     return Plotly.react(place, traces, Object.assign({}, base, layout, { margin: margin }), look);
   }
