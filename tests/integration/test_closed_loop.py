@@ -171,7 +171,9 @@ def test_the_command_writes_rows_once_and_films_them(tmp_path, capsys, monkeypat
 
 def filmed(out: Path, capsys) -> None:
     """The film of the only drive that is there, and what there is none of."""
-    assert main(["animate", str(out), "--policy", "never"]) == 0
+    with (out / "simulation.csv").open(newline="") as file:
+        name = next(csv.DictReader(file))["file"].removesuffix(".xml")
+    assert main(["animate", str(out), "--policy", "never", "--file", name]) == 0
     assert "never: one of 1 that fit" in capsys.readouterr().out
     with Image.open(out / "animation.gif") as film:
         assert 15 < film.n_frames < 25

@@ -304,7 +304,9 @@ def made_row(file, policy, *, hit=None, struck=None, acted=0, peak=0.0, margin=F
         "plan_margin": margin or hit is not None, "contact_s": struck, "contact_from_behind": struck and True,
         "impact_speed_mps": struck and 3.0, "within_verified": False, "interventions": acted,
         "first_intervention_s": 1.0 if acted else None, "peak_deceleration_mps2": peak, "pairs": 0,
-        "jumps": 0, "dissolved": 0, "lost": 0, "drive": {"cycles": [{"ms": 5.0}]},
+        "jumps": 0, "dissolved": 0, "lost": 0, "peak_jerk_mps3": 3.0 * peak, "deviation_ms": 2.0 * peak,
+        "peak_lateral_acceleration_mps2": 0.5 * peak,
+        "drive": {"cycles": [{"t": 0.0, "ms": 5.0}, {"t": 0.2, "ms": 5.0}]},
     }  # fmt: skip
 
 
@@ -332,6 +334,13 @@ def test_the_table_counts():
     assert "5 cases" not in text  # two of a file and plan are one case here
     assert "| lane | f_ttr | 5 | 1 of 2 | 1 (0) | 4 | 2 of 3 [0, " in text
     assert "lane: f_ttr acts for nothing 0.67" in text
+    assert (
+        "lane, f_ttr: cycles p50 5.0, p95 5.0, p99 5.0, p99.9 5.0 ms of a period of 200 ms; who acts, in "
+        in text
+    )
+    assert "jerk 9 m/s³, 1.5 m/s² aside, 6.0 m s off the plan; struck with 3.0 m/s in the median" in text
+    faster = {**rows[0], "drive": {"cycles": [{"t": 0.1 * k, "ms": 5.0} for k in range(3)]}}
+    assert "of periods of 100 to 200 ms" in table_of([*rows, faster])
 
 
 def simulation(tmp_path, **changed) -> Simulation:

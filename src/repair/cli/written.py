@@ -112,6 +112,8 @@ def _film(arguments: argparse.Namespace) -> Film:
     from repair.simulate.many.film import film_in
 
     wanted = {name: getattr(arguments, name) for name in _CHOSEN}
+    if arguments.file is not None and not arguments.file.endswith(".xml"):
+        wanted["file"] = f"{arguments.file}.xml"
     if not _holds_drives(arguments.folder):
         if given := [f"--{name}" for name, value in wanted.items() if value is not None]:
             raise UsageError(f"{' '.join(given)} has no effect on a result")

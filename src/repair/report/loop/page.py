@@ -18,7 +18,7 @@ _DRAWN = 12  # so many cases are drawn
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-size: 13px; }
-td, th { border-bottom: 1px solid #ccc; padding: .25rem .6rem; text-align: left; }
+td, th { border-bottom: 1px solid #ccc; padding: .25rem .6rem; text-align: left; } td { white-space: nowrap; }
 img { max-width: 100%; } figure { margin: 2rem 0; } figcaption { font-weight: 600; }
 """
 

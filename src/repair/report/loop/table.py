@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from statistics import median
 from typing import Any
 
@@ -16,6 +17,7 @@ Row = Mapping[str, Any]
 Count = Callable[[Sequence[Row]], int]
 HARD = 4.0  # a deceleration from here on is a hard one [m/s²]
 _DRAWS = 2000
+_OF_WHO_ACTS = "peak_jerk_mps3", "peak_lateral_acceleration_mps2", "deviation_ms"
 _HEAD = (
     "prediction", "policy", "drives", "avoided", "struck (not from behind)", "acted", "for nothing, contact",
     "for nothing, margin", "hard for nothing", "precision", "median peak [m/s²]", "ahead [s]",
@@ -105,17 +107,32 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
         "median_peak_mps2": median(row["peak_deceleration_mps2"] for row in acted) if acted else None,
         "median_ahead_s": median(ahead) if ahead else None,
         "median_impact_mps": median(row["impact_speed_mps"] for row in struck) if struck else None,
+        **{f"median_{name}": _median(acted, name) for name in _OF_WHO_ACTS},
         **{name: sum(row[name] for row in rows) for name in ("pairs", "jumps", "dissolved", "lost")},
     }
 
 
+def _median(rows: Sequence[Row], name: str) -> float | None:
+    return median(row[name] for row in rows) if rows else None
+
+
 def cycles_of(rows: Sequence[Row]) -> dict[str, float]:
-    """Processor times of all cycles [ms]."""
+    """Processor times of all cycles, and from one to the next at least and at most [ms]."""
     spent = [cycle["ms"] for row in rows for cycle in row["drive"]["cycles"]]
     if not spent:
         return {}
     found = np.percentile(spent, (50, 95, 99, 99.9))
-    return {name: float(v) for name, v in zip(("p50", "p95", "p99", "p99.9"), found, strict=True)}
+    times = {name: float(v) for name, v in zip(("p50", "p95", "p99", "p99.9"), found, strict=True)}
+    begins = ([cycle["t"] for cycle in row["drive"]["cycles"]] for row in rows)
+    periods = [round(1e3 * (two - one), 3) for t in begins for one, two in pairwise(t)]
+    return {**times, "period_min": min(periods), "period_max": max(periods)} if periods else times
+
+
+def _of_period(times: Mapping[str, float]) -> str:
+    if "period_max" not in times:
+        return ""
+    low, high = times["period_min"], times["period_max"]
+    return f" of a period of {low:g} ms" if low == high else f" of periods of {low:g} to {high:g} ms"
 
 
 def table_of(rows: Sequence[Row]) -> str:
@@ -163,15 +180,24 @@ def _shown(value: float | None, digits: int) -> str:
 
 def _below(prediction: str, policy: str, own: Sequence[Row]) -> str:
     s, times = summary(own), cycles_of(own)
-    words = [f"{name} {value:.1f}" for name, value in times.items()]
-    text = f"{prediction}, {policy}: cycles {', '.join(words)} ms"
+    words = [
+        f"{name} {value:.1f}" for name, value in times.items() if name.startswith("p") and name[1].isdigit()
+    ]
+    text = f"{prediction}, {policy}: cycles {', '.join(words)} ms{_of_period(times)}"
     if s["pairs"]:
         text += (
             f"; of {s['pairs']} pairs of cycles the F-TTR jumps in {s['jumps']}, is lost before it is due in "
             f"{s['lost']}, and the conflict dissolves in {s['dissolved']}"
         )
     if s["within_verified"]:
-        text += f"; {s['within_verified']} contacts within what was verified"
+        count = s["within_verified"]
+        text += f"; {count} contact{'s' if count > 1 else ''} within what was verified"
+    if s["acted"]:
+        jerk, aside, off = (s[f"median_{name}"] for name in _OF_WHO_ACTS)
+        text += f"; who acts, in the median: jerk {jerk:.0f} m/s³, {aside:.1f} m/s² aside, {off:.1f} m s "
+        text += "off the plan"
+    if s["struck"]:
+        text += f"; struck with {s['median_impact_mps']:.1f} m/s in the median"
     return text
 
 
