@@ -137,6 +137,23 @@ def test_what_is_shown_is_what_is_stored(stored):
     assert abs(shown["t"][-1] - reference["t"][-1]) < 0.01
 
 
+def test_the_certificate_is_kept_and_shown(stored, tmp_path):
+    """With every margin, as `repair certify` prints them."""
+    file = stored / "ZAM_Test-1_1_T-1.xml"
+    study = replace(Study((file,)), references=("constant",), official=False, certify=True)
+    row, whole = row_of(tasks_of(study)[0], Kept())
+    assert row["certificate"] == "ok"
+    certificate = unpacked(whole)["certificate"]
+    assert certificate["sentence"].startswith("certified")
+    assert "obstacle_collision" in [line[0] for line in certificate["rows"]]
+    assert {line[4] for line in certificate["rows"]} <= {"ok", "told"}
+    detail = detail_of(unpacked(whole)["record"], unpacked(whole)["drawing"], certificate)
+    assert detail["certificate"] == certificate
+    page = study_page([row], [unpacked(whole)], {}, {})
+    packed = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))["details"][0]
+    assert json.loads(gzip.decompress(base64.b64decode(packed)))["certificate"] == certificate
+
+
 # -- the page --------------------------------------------------------------------------------------
 
 

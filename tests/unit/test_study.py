@@ -33,6 +33,7 @@ from repair.study.rows import STUDY_COLUMNS, failed_row, strict, type_of, volati
 from repair.study.run import Progress, estimate, run_study
 from repair.study.store import STORE_FILE, Store
 from repair.study.task import Kept, row_of, unpacked
+from repair.study.worker import run_task
 
 CONSTANT = ("constant",)
 
@@ -112,6 +113,15 @@ def test_relative_paths_and_names(tmp_path, folder):
     assert [path.name for path in read.files] == ["here.xml", file.name]
 
 
+def test_a_bundled_scenario_that_is_named_twice_is_taken_once(tmp_path):
+    """Each time that one is looked up it is made anew, at another place."""
+    from repair.paper.bundled import find_scenario
+
+    file = written(tmp_path, "scenarios: [scenario_1, scenario_1]\n")
+    with ExitStack() as kept:
+        assert len(read_study(file, lambda name: kept.enter_context(find_scenario(name))).files) == 1
+
+
 @pytest.mark.parametrize(
     "text, words",
     [
@@ -122,6 +132,8 @@ def test_relative_paths_and_names(tmp_path, folder):
         ("scenarios: FOLDER\nbackends: [egoo]", "'egoo' is unknown"),
         ("scenarios: FOLDER\nbackends: [ego, ego]", "twice"),
         ("scenarios: FOLDER\nreferences: [plan]", "plan"),
+        ("scenarios: FOLDER\nreferences: [file]", "names no solution file"),
+        ("scenarios: FOLDER\nreferences: [given]", "a study has none"),
         ("scenarios: FOLDER\nvary: {search.delta: [0.1]}", "did you mean 'search.delta_t'"),
         ("scenarios: FOLDER\nvary: {search.delta_t: [0.1, -3]}", "search.delta_t"),
         ("scenarios: FOLDER\nvary: {search.delta_t: 0.1}", "a list of values"),
@@ -341,6 +353,50 @@ def test_only_what_is_missing_is_made(study, tmp_path, capsys):
         finer = replace(study, variations=(Variation("0.1", (("search.delta_t", 0.1),)),))
         assert run_study(tasks_of(finer), store, Here("one"), progress=False).made == 6
         assert len(list(store.rows())) == 6  # the table is that of the study that was run last
+
+
+def test_who_is_given_more_time_is_made_again(study, tmp_path):
+    """And nobody else: neither what is there, nor what another limit would end as well."""
+    first, second, third = tasks_of(study)[:3]
+    with Store(tmp_path) as store:
+        store.plan([first, second, third])
+        for task, status, detail in (
+            (first, "timeout", first.too_late), (second, "memory", second.too_much), (third, "crash", "fell"),
+        ):  # fmt: skip
+            row = failed_row(task.file, task.backend, task.reference, status, detail)
+            store.add(task, strict(row | {"variation": task.variation}), None)
+        usual = [first, second, third]
+        assert run_study(usual, store, Here("one"), progress=False).made == 0
+        longer = [replace(task, timeout=900.0) for task in usual]
+        assert estimate(longer, store, 1)[0] == 2
+        assert run_study(longer, store, Here("one"), progress=False).made == 1
+        larger = [replace(task, memory=9000.0) for task in longer]
+        assert run_study(larger, store, Here("one"), progress=False).made == 1
+        assert [row["status"] for row in store.rows()] == ["found", "found", "crash"]
+        assert run_study(usual, store, Here("one"), progress=False).made == 0
+
+
+def test_without_end_is_a_time(study):
+    task = replace(tasks_of(study)[0], timeout=float("inf"))
+    assert run_task(task, lambda task, kept: ({"file": task.file}, None))[0]["file"] == task.file
+
+
+def test_a_dry_run_of_some_rows(folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("repair.study.engine.LocalLanes", lambda count: Here("one"))
+    file = written(tmp_path, f"scenarios: {folder}\nbackends: [ego, qptr]\nofficial: false\n")
+    argv = ["study", str(file), "--out", str(tmp_path / "out")]
+    assert main([*argv, "--limit", "2"]) == 0
+    with Store(tmp_path / "out") as store:
+        store.base.execute("UPDATE rows SET row_time_s = 30.0")
+    dry = [*argv, "--resume", "--dry-run"]
+    capsys.readouterr()
+    assert main(dry) == 0
+    assert main([*dry, "--limit", "1"]) == 0
+    assert main([*dry, "--dask", "tcp://127.0.0.1:9"]) == 0
+    whole, one, cluster = capsys.readouterr().out.splitlines()
+    assert whole.endswith("4 to make: about 120 s with 1 worker")
+    assert one.endswith("4 to make, 1 of them now: about 30 s with 1 worker")
+    assert cluster.endswith("by all workers of the cluster together")
 
 
 def test_progress_where_nobody_watches(capsys):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 __all__ = [
     "SAMPLE",
@@ -12,6 +13,7 @@ __all__ = [
     "TOLERANCE",
     "Certificate",
     "CertificateRow",
+    "as_table",
     "at_least",
     "at_most",
     "equal",
@@ -112,12 +114,28 @@ def format_certificate(certificate: Certificate) -> str:
     width = max(len(row.name) for row in certificate.rows)
     lines.append(f"{'':{width}}  {'value':>10}  {'limit':>10}  {'margin':>10}  {'':8}  how")
     for row in certificate.rows:
-        verdict = "told" if not row.claim else "ok" if row.ok else "VIOLATED"
+        verdict = _verdict(row)
         value, limit, margin = map(_figure, (row.value, row.limit, row.margin))
         how = f"{row.how}, {row.unit}" if row.unit else row.how
         lines.append(f"{row.name:{width}}  {value}  {limit}  {margin}  {verdict:8}  {how}")
     lines.append(_sentence(certificate))
     return "\n".join(lines)
+
+
+def as_table(certificate: Certificate) -> dict[str, Any]:
+    """The certificate for a page: its sentence, and its rows as words."""
+    rows = [
+        [
+            row.name, *(_figure(x).strip() for x in (row.value, row.limit, row.margin)),
+            _verdict(row), f"{row.how}, {row.unit}" if row.unit else row.how,
+        ]
+        for row in certificate.rows
+    ]  # fmt: skip
+    return {"sentence": _sentence(certificate), "rows": rows}
+
+
+def _verdict(row: CertificateRow) -> str:
+    return "told" if not row.claim else "ok" if row.ok else "VIOLATED"
 
 
 def _sentence(certificate: Certificate) -> str:

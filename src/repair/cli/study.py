@@ -81,7 +81,11 @@ def _run(arguments: argparse.Namespace, chosen: Study) -> int:
     if arguments.dry_run:
         with ExitStack() as opened:
             store = opened.enter_context(Store(out, readonly=True)) if there else None
-            print(_words(len(tasks), *estimate(tasks, store, workers), workers))
+            told = estimate(tasks, store, workers, arguments.limit)
+            spread = (
+                "by all workers of the cluster together" if arguments.dask is not None else _with(workers)
+            )
+            print(_words(len(tasks), *told, arguments.limit, spread))
         return 0
     lanes: Lanes
     lanes = ClusterLanes(arguments.dask) if arguments.dask is not None else LocalLanes(workers)
@@ -93,23 +97,33 @@ def _run(arguments: argparse.Namespace, chosen: Study) -> int:
             ran = run_study(tasks, store, lanes, limit=arguments.limit)
         except KeyboardInterrupt:
             done = sum(task["done"] for task in store.tasks())
-            words = f"repair: interrupted; {done} of {len(tasks)} rows are stored in {store.path}"
+            words = f"repair: interrupted; {done} of {_rows(len(tasks))} are stored in {store.path}"
             print(f"{words}, and --resume goes on", file=sys.stderr)
             return 130
         left = f"; {ran.left} are left, and --resume goes on" if ran.left else ""
-        print(f"{ran.made} rows made, {ran.before} were there{left}")
+        print(f"{_rows(ran.made)} made, {ran.before} were there{left}")
         print(store.path)
     return 0
 
 
-def _words(total: int, done: int, seconds: float | None, workers: int) -> str:
+def _with(workers: int) -> str:
+    return f"with {workers} worker{'s' if workers > 1 else ''}"
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'s' if count != 1 else ''}"
+
+
+def _words(total: int, done: int, seconds: float | None, limit: int | None, spread: str) -> str:
     """What a dry run says."""
-    text = f"{total} rows, {done} of them there, {total - done} to make"
+    text = f"{_rows(total)}, {done} of them there, {total - done} to make"
     if total == done:
         return text
+    if limit is not None and limit < total - done:
+        text += f", {limit} of them now"
     if seconds is None:
         return f"{text}; no row is there yet that says how long they take (--limit 10 makes some)"
-    return f"{text}: about {seconds:.0f} s with {workers} worker{'s' if workers > 1 else ''}"
+    return f"{text}: about {seconds:.0f} s {spread}"
 
 
 def _export(arguments: argparse.Namespace) -> int:

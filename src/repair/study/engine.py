@@ -238,7 +238,7 @@ def _answer(ended: _Busy) -> Answer:
     task = ended.task
     if not ended.future.done():
         ended.lane.replace()
-        return _lost(task, "timeout", f"no answer within {task.timeout:g} s")
+        return _lost(task, "timeout", task.too_late)
     try:
         return ended.future.result()
     except Exception as error:  # of the executor: what a row raises is told by the row
@@ -246,9 +246,9 @@ def _answer(ended: _Busy) -> Answer:
         ended.lane.replace()
         words = one_line(error)
         if f"EXIT({TOO_MUCH_MEMORY})" in words:
-            return _lost(task, "memory", f"it took more than {task.memory:g} MB")
+            return _lost(task, "memory", task.too_much)
         if spent >= task.timeout:
-            return _lost(task, "timeout", f"no answer within {task.timeout:g} s")
+            return _lost(task, "timeout", task.too_late)
         how = re.search(r"\{(.*?)\}", words)
         return _lost(task, "crash", f"the worker process ended: {how.group(1) if how else words}")
 

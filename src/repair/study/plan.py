@@ -135,6 +135,21 @@ class Task:
         parts = (self.file, self.sha256, self.reference, self.config_sha256, package_version())
         return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
+    @property
+    def too_late(self) -> str:
+        """What a row says that has taken too long."""
+        return f"no answer within {self.timeout:g} s"
+
+    @property
+    def too_much(self) -> str:
+        """What a row says that has taken too much memory."""
+        return f"it took more than {self.memory:g} MB"
+
+    def still_lost(self, status: str, detail: str) -> bool:
+        """Whether a row that is there would be lost again: no limit that ended it is another one now."""
+        said = {"timeout": self.too_late, "memory": self.too_much}.get(status, detail)
+        return detail == said
+
 
 def package_version() -> str:
     """Of this package; what another version made is made again."""
@@ -211,9 +226,18 @@ def _configured(study: Study) -> Iterator[tuple[Variation, Config, dict[str, Any
                 raise ConfigError(f"{key} is no setting of a study; it names backends and references itself")
         named["reference.source"] = reference
         config = load_config(study.preset, study.config, named, backend=backend)
+        _require_reference(config)
         make_backend(backend, config)
         values = values_of(config)
         yield variation, config, {key: values[key] for key in study.varied}, _digest(config, study)
+
+
+def _require_reference(config: Config) -> None:
+    """Refuse a reference that no row could have."""
+    if config.reference.source == "given":
+        raise ConfigError("reference given comes from a program's memory; a study has none")
+    if config.reference.source == "file" and not config.reference.file:
+        raise ConfigError("reference file names no solution file; set reference.file says which")
 
 
 def _as_mapping(texts: Sequence[str]) -> dict[str, Any]:

@@ -151,7 +151,7 @@ class _Read:
         if "scenarios" not in self.content:
             raise ConfigError(f"{self.path} names no scenarios")
         found: dict[Path, None] = {}
-        for entry in self.names("scenarios", ()):
+        for entry in dict.fromkeys(self.names("scenarios", ())):
             try:
                 found.update(dict.fromkeys(self._files(entry, find)))
             except (OSError, ValueError, NotImplementedError) as error:

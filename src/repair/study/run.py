@@ -118,7 +118,7 @@ def run_study(
         If a row cannot be written.
     """
     store.plan(tasks)
-    there = store.done()
+    there = store.done_of(tasks)
     missing = {task.key: task for task in tasks if task.key not in there}
     wanted = list(missing.values())[:limit]
     before = len(tasks) - len(missing)
@@ -135,28 +135,30 @@ def run_study(
     return Ran(len(tasks), before, shown.made)
 
 
-def estimate(tasks: Sequence[Task], store: Store | None, workers: int) -> tuple[int, float | None]:
+def estimate(
+    tasks: Sequence[Task], store: Store | None, workers: int, limit: int | None = None
+) -> tuple[int, float | None]:
     """How many rows are there, and how long the others will take [s]; None where no row says anything.
 
-    A row takes as long as those of its backend and variation have taken, else those of its backend, else all.
+    Of the others, the first ``limit`` are counted. A row takes as long as those of its backend and variation
+    have taken, else those of its backend, else all.
     """
     if store is None:
         return 0, None
-    there = store.done()
+    there = store.done_of(tasks)
+    missing = [task for task in tasks if task.key not in there][:limit]
     query = "SELECT backend, variation, row_time_s FROM rows WHERE row_time_s IS NOT NULL"
     known: dict[tuple[str, ...], list[float]] = {}
     for row in store.base.execute(query):
         for name in ((row["backend"], row["variation"]), (row["backend"],), ()):
             known.setdefault(name, []).append(row["row_time_s"])
     if not known:
-        return sum(task.key in there for task in tasks), None
+        return len(there), None
     means = {name: fmean(times) for name, times in known.items()}
     seconds = sum(
-        means.get((task.backend, task.variation), means.get((task.backend,), means[()]))
-        for task in tasks
-        if task.key not in there
+        means.get((task.backend, task.variation), means.get((task.backend,), means[()])) for task in missing
     )
-    return sum(task.key in there for task in tasks), seconds / max(workers, 1)
+    return len(there), seconds / max(workers, 1)
 
 
 # -- a sweep is a study of one folder ---------------------------------------------------------------

@@ -154,6 +154,12 @@ class Store:
         """The keys of all rows."""
         return {row["key"] for row in self.base.execute("SELECT key FROM rows")}
 
+    def done_of(self, tasks: Iterable[Task]) -> set[str]:
+        """The keys of the tasks whose rows are there, but for those that another limit than now has ended."""
+        query = "SELECT key, status, detail FROM rows"
+        said = {row["key"]: (row["status"], row["detail"]) for row in self.base.execute(query)}
+        return {task.key for task in tasks if task.key in said and task.still_lost(*said[task.key])}
+
     def add(self, task: Task, row: Mapping[str, Any], whole: bytes | None) -> None:
         """Write a row; it is there when this returns, whatever comes then.
 
@@ -166,10 +172,14 @@ class Store:
         values = [task.key, task.sha256, task.config_sha256, package_version(), *held, whole]
         names = ("key", "sha256", "config_sha256", "version", *self.table.columns, "result")
         try:
-            self.base.execute(
-                f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})",
-                values,
-            )
+            with self._whole():
+                # A row that a limit has ended makes room for what came of another limit.
+                lost = "status IN ('timeout', 'memory')"
+                self.base.execute(f"DELETE FROM rows WHERE key = ? AND {lost}", (task.key,))
+                self.base.execute(
+                    f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})",
+                    values,
+                )
         except sqlite3.Error as error:
             raise OutputError(f"a row cannot be written to {self.path}: {in_words(error)}") from error
 

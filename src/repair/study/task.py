@@ -164,14 +164,17 @@ def run_file(path: Path, settings: SweepSettings) -> list[dict[str, Any]]:
     return [as_sweep_row(row_of(task, kept)[0]) for task in tasks]
 
 
-def packed(record: dict[str, Any], drawing: dict[str, Any] | None) -> bytes:
-    """A whole result, compressed: what ``result.json`` and ``drawing.json`` hold."""
-    text = json.dumps({"record": record, "drawing": drawing}, allow_nan=False, separators=(",", ":"))
+def packed(
+    record: dict[str, Any], drawing: dict[str, Any] | None, certificate: dict[str, Any] | None = None
+) -> bytes:
+    """A whole result, compressed: what ``result.json`` and ``drawing.json`` hold, and its certificate."""
+    whole = {"record": record, "drawing": drawing, "certificate": certificate}
+    text = json.dumps(whole, allow_nan=False, separators=(",", ":"))
     return zlib.compress(text.encode("utf-8", "backslashreplace"), 6)
 
 
 def unpacked(whole: bytes) -> dict[str, Any]:
-    """``record`` and ``drawing`` of a stored result."""
+    """``record``, ``drawing`` and, where it was asked for, ``certificate`` of a stored result."""
     content: dict[str, Any] = json.loads(zlib.decompress(whole))
     return content
 
@@ -219,12 +222,13 @@ def _row(task: Task, kept: Kept) -> tuple[dict[str, Any], bytes | None]:
         row.update(onward=onward["kind"], onward_reached=onward["reached"], onward_detail=onward["sentence"])
     if task.official and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
         row.update(_official(result))
+    certificate = None
     if task.certify and result.status in (SearchStatus.FOUND, SearchStatus.NO_CONFLICT):
-        row["certificate"] = _certificate(result)
+        row["certificate"], certificate = _certificate(result)
     if not task.results:
         return row, None
     drawing = result.outcome.drawing
-    return row, packed(content, None if drawing is None else drawing_to_dict(drawing))
+    return row, packed(content, None if drawing is None else drawing_to_dict(drawing), certificate)
 
 
 def _evasive(found: EvasiveResult) -> dict[str, Any]:
@@ -275,14 +279,15 @@ def _ending(terminal: dict[str, Any] | None) -> dict[str, Any]:
     }
 
 
-def _certificate(result: Any) -> str:
-    """``ok``, or the margins that are violated."""
+def _certificate(result: Any) -> tuple[str, dict[str, Any]]:
+    """``ok``, or the margins that are violated; and all of them."""
+    from repair.certify.certificate import as_table
     from repair.certify.recompute import certify
 
     with tempfile.TemporaryDirectory() as folder:
         result.save(folder, figure=False)
         certificate = certify(Path(folder))
-    return "; ".join(row.name for row in certificate.rows if row.claim and not row.ok) or "ok"
+    return "; ".join(certificate.broken) or "ok", as_table(certificate)
 
 
 def _official(result: Any) -> dict[str, Any]:

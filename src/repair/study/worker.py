@@ -27,6 +27,7 @@ Answer = tuple[dict[str, Any], bytes | None]
 #: The exit status of a process that has taken more memory than it may.
 TOO_MUCH_MEMORY = 77
 _LOOKS = 0.1  # how often the watch looks [s]
+_EVER = 1e6  # longer than any row takes, and not too long for the clock [s]
 
 _kept = Kept()
 _alone = threading.Lock()  # a process may have several threads, and what is kept belongs to one scenario
@@ -121,7 +122,7 @@ def run_task(task: Task, make: Callable[[Task, Kept], Answer] = row_of) -> Answe
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
             _watch.memory = task.memory
             # A thread that needs no lock of the interpreter: also what never comes back to Python ends.
-            faulthandler.dump_traceback_later(task.timeout, exit=True, file=nowhere)
+            faulthandler.dump_traceback_later(min(task.timeout, _EVER), exit=True, file=nowhere)
             try:
                 row, whole = make(task, _kept)
             finally:

@@ -17,8 +17,10 @@ __all__ = ["case_of", "detail_of"]
 _POINTS = 70  # of a curve
 
 
-def detail_of(record: Mapping[str, Any], drawing: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The curves of one result, what was said of each time-to-repair, and its limits."""
+def detail_of(
+    record: Mapping[str, Any], drawing: Mapping[str, Any] | None, certificate: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """The curves of one result, what was said of each time-to-repair, its limits, and its certificate."""
     detail: dict[str, Any] = {
         "sentence": record["status_sentence"],
         "status": record["status"],
@@ -32,6 +34,7 @@ def detail_of(record: Mapping[str, Any], drawing: Mapping[str, Any] | None) -> d
         },
         "notes": list(record["notes"]),
         "lines": [],
+        "certificate": certificate,
     }  # fmt: skip
     if drawing is None:
         return detail

@@ -40,7 +40,7 @@ def study_page(
     rows : sequence of mapping
         With the columns of a study.
     wholes : iterable of mapping or None
-        The whole result of each row, ``record`` and ``drawing``, where it was kept.
+        The whole result of each row, ``record``, ``drawing`` and perhaps ``certificate``, where it was kept.
     about : mapping
         What was run: command, versions, the study's own text; by name.
     files : mapping
@@ -62,7 +62,7 @@ def study_page(
         drawing = whole["drawing"]
         if drawing is not None and name not in cases:
             cases[name] = _packed(case_of(drawing))
-        details.append(_packed(detail_of(whole["record"], drawing)))
+        details.append(_packed(detail_of(whole["record"], drawing, whole.get("certificate"))))
     figures = figures_of(rows)
     head, body = summary_of(rows)
     columns = [name for name in _SHOWN if any(row.get(name) not in (None, "") for row in rows)]

@@ -151,13 +151,16 @@
       item.textContent = note;
       return item;
     }));
-    by("probes").tBodies[0].replaceChildren(...one.probes.map((probe) => {
+    const rowOf = (cells) => {
       const row = document.createElement("tr");
-      for (const text of [probe.t.toFixed(2), probe.by, probe.ok ? "feasible" : "rejected", probe.words, probe.why]) {
-        row.insertCell().textContent = text;
-      }
+      for (const text of cells) row.insertCell().textContent = text;
       return row;
-    }));
+    };
+    by("probes").tBodies[0].replaceChildren(...one.probes.map((probe) =>
+      rowOf([probe.t.toFixed(2), probe.by, probe.ok ? "feasible" : "rejected", probe.words, probe.why])));
+    by("certificate").hidden = !one.certificate;
+    by("certificate-words").textContent = one.certificate ? one.certificate.sentence : "";
+    by("certificate-rows").replaceChildren(...(one.certificate ? one.certificate.rows : []).map(rowOf));
     one.repairs = one.lines.filter((each) => each.kind === "repair").sort((a, b) => a.t_rep - b.t_rep);
     const best = one.repairs.findLastIndex((each) => one.f_ttr !== null && Math.abs(each.t_rep - one.f_ttr) < 1e-6);
     const slider = by("slider");
