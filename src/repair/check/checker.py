@@ -28,6 +28,7 @@ from repair.check.settings import CheckerConfig
 from repair.check.verdict import Reason, Verdict, Violation, met
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import STANDSTILL
+from repair.deadline import in_time
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.timegrid import INSTANT, steps_until
@@ -130,12 +131,14 @@ class Checker:
         after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
         path, s, slip0 = self._spliced(problem, after, times, first)
         if not is_finite(path):
-            return _NOT_FINITE
+            return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
         slip, orientation = self.scene.model.angles(path, slip0)
         found = self._limits(curve, after, problem, path)
         if self.config.margin:
             found += boxes_entered(problem, curve, after, self.times(problem.t_end), self.config.substeps)
+        in_time()
         found += self._clear(path, s, orientation, first, problem.t_rep)[0]
+        in_time()
         found += self._extra(problem, path, slip, orientation, len(path.t) - len(after))
         if self.config.limits and not found:
             at = slice(None, None, self.config.substeps)
@@ -193,7 +196,7 @@ class Checker:
         """Verdict on a reference trajectory: by the same measure as a repair's, jerks apart."""
         path, s, slip, orientation = self._follow(reference, t_end)
         if not is_finite(path):
-            return _NOT_FINITE
+            return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
         found, contact = self._clear(path, s, orientation, 0, 0.0)
         self._touched = reference, t_end, contact
         if self.config.limits:
@@ -344,6 +347,3 @@ class Checker:
             return []
         states = self.scene.model.states(path.t, path.xy, path.speed, slip, orientation)
         return violations_of(self._checks, Driven(problem, path, states, late))
-
-
-_NOT_FINITE = Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))

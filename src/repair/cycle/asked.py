@@ -94,4 +94,4 @@ def since(begin: float) -> float:
 
 def spare(deadline: float) -> float:
     """What is left for making the answer of what was found [s]."""
-    return min(5e-4, 0.1 * deadline)
+    return min(1e-3, 0.1 * deadline)
