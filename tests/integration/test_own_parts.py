@@ -67,6 +67,16 @@ def test_who_is_no_planner_and_who_fails():
     with pytest.raises(ReferenceTrajectoryError, match="planning by Failing"):
         planner.plan(None, None, np.zeros((2, 2)))
     assert planner.result is None
+    planner = repair.RepairingPlanner(Idle())  # whose answer is not to be another's reference
+    with pytest.raises(ReferenceTrajectoryError, match="Idle has planned nothing"):
+        planner.plan(None, None)
+
+
+class Idle:
+    """Gives up without a word."""
+
+    def plan(self, sc, pp, ref_path=None):
+        return None
 
 
 class Failing:

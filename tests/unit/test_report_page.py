@@ -186,6 +186,7 @@ def test_the_page_stands_by_itself(stored):
     assert parser.refers == ["data:,"]  # no icon is asked for
     assert "@import" not in page.split("</style>")[0]
     assert "repair study &lt;test&gt;.yaml" in page
+    assert f"numpy {np.__version__}" in page  # what the rows were made with
     assert len(page) < 8e6
 
 

@@ -72,6 +72,8 @@ class RepairingPlanner(TrajectoryPlannerInterface):  # type: ignore[misc]  # com
         """
         with foreign(f"planning by {type(self.nominal).__name__}", ReferenceTrajectoryError):
             planned = self.nominal.plan(sc, pp, ref_path)
+        if planned is None:  # which would ask for a reference of our own
+            raise ReferenceTrajectoryError(f"{type(self.nominal).__name__} has planned nothing")
         scene = scene_from_scenario(sc, pp, self.config)
         self.result = repair(scene, self.config, reference=planned)
         return self.result.trajectory

@@ -10,7 +10,6 @@ from repair.errors import RepairError
 from repair.io.result_json import load_result
 from repair.report.page.html import study_page
 from repair.report.page.one import result_page
-from repair.study.plan import package_version
 from repair.study.run import Progress
 from repair.study.store import Store
 from repair.study.task import unpacked
@@ -32,7 +31,8 @@ def page_of_study(folder: Path) -> str:
             raise RepairError(f"{store.path} holds no row of its study yet")
         done = [task for task in tasks if task["done"]]
         told = {
-            "command": "", "study": "", **store.about(), "version": package_version(),
+            "command": "", "study": "", **store.about(), "version": ", ".join(store.versions()),
+            "versions of the first row": _versions(store, done),
             "rows": f"{len(done)} of {len(tasks)} are there",
         }  # fmt: skip
         told = {name: text for name, text in told.items() if text and name != "schema"}
@@ -47,6 +47,14 @@ def page_of_study(folder: Path) -> str:
             shown.close()
 
         return study_page(rows, wholes(), told, files)
+
+
+def _versions(store: Store, done: list[dict[str, Any]]) -> str:
+    """What the first stored result was made with; empty where no result was kept."""
+    kept = (store.whole(task["position"]) for task in done)
+    first = next((whole for whole in kept if whole is not None), None)
+    found = {} if first is None else unpacked(first)["record"].get("versions", {})
+    return "\n".join(f"{name} {version}" for name, version in found.items())
 
 
 def page_of_result(folder: Path) -> str:

@@ -203,6 +203,11 @@ class Store:
         found = self.base.execute(query, (position,)).fetchone()
         return None if found is None else found["result"]
 
+    def versions(self) -> list[str]:
+        """Of this package, by which the rows of the study were made."""
+        query = "SELECT DISTINCT version FROM tasks JOIN rows USING (key) ORDER BY version"
+        return [row["version"] for row in self.base.execute(query)]
+
     def tasks(self) -> list[dict[str, Any]]:
         """What the study is: each task with its position, and whether its row is there."""
         joined = "tasks LEFT JOIN rows USING (key) ORDER BY position"

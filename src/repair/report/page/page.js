@@ -340,7 +340,9 @@
 
   by("relative").addEventListener("change", () => { if (one) draw(); });
   by("slider").addEventListener("input", () => { if (one) draw(); });
-  const first = data.details.findIndex((each) => each !== null);
+  const status = data.columns.indexOf("status"), kept = data.details.map((each) => each !== null);
+  const repaired = kept.findIndex((there, k) => there && data.rows[k][status] === "found");
+  const first = repaired >= 0 ? repaired : kept.indexOf(true);
   if (first >= 0) jobs.push(() => choose(first, false));
   later();
 })();
