@@ -22,9 +22,9 @@ from repair.report.rows.why import why_rows
 from repair.report.text import summary
 from repair.search.result import SearchStatus
 from repair.solvers.registry import BACKENDS, make_backend
-from repair.why.kinds import KINDS, under
+from repair.why.kinds import KINDS, among, under
 from repair.why.moved import delayed, only_between, translated
-from repair.why.obstacles import minimal
+from repair.why.obstacles import minimal, shortest
 
 GOAL = "<goalState><time><intervalStart>39</intervalStart><intervalEnd>40</intervalEnd></time></goalState>"
 LONG = driving(39, 300.0, 0.0, 0.0, range(1, 81))  # only says how long the traffic is known
@@ -168,6 +168,39 @@ def test_two_who_close_the_road_together_are_both_named(tmp_path):
     assert sorted(one.id for one in why.blocking.obstacles) == [30, 31]
     gone = [one for one in why.relaxations if one.kind == "removed"]
     assert [one.sufficient for one in gone] == [True, True]
+
+
+@given(st.integers(0, 30), st.integers(0, 30), st.integers(30, 40))
+def test_the_shortest_while_is_the_one_that_is_needed(first, length, last):
+    needed = first, min(first + length, last)
+    found = shortest(lambda a, b: a <= needed[0] and b >= needed[1], last)
+    assert found == needed
+
+
+@pytest.mark.exhaustive
+def test_without_a_proof_each_of_two_has_the_shortest_while_in_which_they_leave_nothing(tmp_path):
+    both = standing(30, 42.0, 1.6, 1.0, 3.0) + standing(31, 42.0, -1.6, 1.0, 3.0)
+    keys = "explain.kinds=[removed]", "bound.nodes=1", "fallback=[]", "explain.time_limit=60"
+    situation = prepared(written(tmp_path, both, own=24.0, width=7.0), *keys)
+    _, why = explained(situation)
+    scene, backends = situation.scene, [make_backend(name, situation.config) for name in why.asked]
+    blockers = why.blocking.obstacles
+    assert not why.blocking.proven
+    assert sorted(one.id for one in blockers) == [30, 31]
+    steps = {one.index: (round(one.since / scene.dt), round(one.until / scene.dt)) for one in blockers}
+
+    def free(changed):
+        some = tuple(only_between(scene.obstacles[k], *span) for k, span in {**steps, **changed}.items())
+        other = among(situation, some)
+        beyond = other.conflict.time > other.t_end
+        return beyond or any(
+            find(other, backend, visits=(why.t_rep,)).status is SearchStatus.FOUND for backend in backends
+        )
+
+    assert not free({})
+    for k, (first, last) in steps.items():
+        assert free({k: (first + 1, last)})
+        assert free({k: (first, last - 1)})
 
 
 def test_a_later_repair_is_explained_where_there_is_one(tmp_path):

@@ -20,12 +20,12 @@ from repair.scene.scene import Scene
 from repair.scene.traffic.obstacle import Obstacle
 from repair.vehicle.model import KinematicSingleTrack
 from repair.vehicle.parameters import Vehicle
-from repair.why.moved import delayed, only_between, translated
+from repair.why.moved import delayed, translated
 from repair.why.slower import Slower, slower_start
 from repair.why.stronger import Stronger, more_grip, more_power, more_steering
 from repair.world.road_corridor import RoadCorridor
 
-__all__ = ["KINDS", "Kind", "among", "between", "under"]
+__all__ = ["KINDS", "Kind", "among", "under"]
 
 _MODEL = "the vehicle is no kinematic single-track model"
 
@@ -74,11 +74,6 @@ KINDS: dict[str, Kind] = {
 def among(prepared: Prepared, obstacles: tuple[Obstacle, ...]) -> Prepared:
     """The situation among other traffic, until the same end."""
     return _laid_out(prepared, replace(prepared.scene, obstacles=obstacles))
-
-
-def between(prepared: Prepared, obstacles: tuple[Obstacle, ...], first: int, last: int) -> Prepared:
-    """The situation among traffic that is there at the steps ``first`` .. ``last`` alone."""
-    return among(prepared, tuple(only_between(one, first, last) for one in obstacles))
 
 
 def under(prepared: Prepared, kind: str, amount: float = 0.0, index: int | None = None) -> Prepared:

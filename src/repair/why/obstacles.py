@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ from repair.bounds.latest import Proof
 from repair.preparation import Prepared
 from repair.timegrid import steps_until
 from repair.why.asked import Asked, Cut
-from repair.why.kinds import among, between
+from repair.why.kinds import among
+from repair.why.moved import only_between
 
-__all__ = ["Blocker", "Blocking", "blocking", "minimal"]
+__all__ = ["Blocker", "Blocking", "blocking", "minimal", "shortest"]
 
 
 @dataclass(frozen=True)
@@ -149,10 +151,8 @@ def _with_times(prepared: Prepared, asked: Asked, kept: list[int], proven: bool)
                 _blocker(prepared, k) if span is None else _blocker(prepared, k, *span)
                 for k, span in spans.items()
             ]
-        elif len(kept) == 1:
-            found = [_blocker(prepared, kept[0], *_span(prepared, asked, obstacles))]
         else:
-            found = [_blocker(prepared, k) for k in kept]
+            found = [_blocker(prepared, k, *span) for k, span in _spans(prepared, asked, kept).items()]
     except Cut:
         found = [_blocker(prepared, k) for k in kept]
     return Blocking(tuple(found), proven, True, road)
@@ -177,15 +177,43 @@ def _cuts(node: dict[str, Any]) -> set[int]:
     return found
 
 
-def _span(prepared: Prepared, asked: Asked, obstacles: tuple[Any, ...]) -> tuple[float, float]:
-    """The shortest while in which obstacles that are there at no other time leave no repair [s]."""
-    dt = prepared.scene.dt
-    first, last = 0, min(steps_until(prepared.t_end, dt) + 1, prepared.scene.n_steps)
+def _spans(
+    prepared: Prepared, asked: Asked, kept: Sequence[int]
+) -> dict[int, tuple[float | None, float | None]]:
+    """The shortest while for each obstacle in which all of them, there at no other time, leave no repair [s].
 
-    def blocked(a: int, b: int) -> bool:
-        return asked.repair(between(prepared, obstacles, a, b), proofs=False) is None
+    One after the other: those before are there in their while alone, those after all the time. Where the time
+    is up, the rest have none.
+    """
+    dt, obstacles = prepared.scene.dt, prepared.scene.obstacles
+    last = min(steps_until(prepared.t_end, dt) + 1, prepared.scene.n_steps)
+    steps = dict.fromkeys(kept, (0, last))
+    found: dict[int, tuple[float | None, float | None]] = dict.fromkeys(kept, (None, None))
 
-    low, high = first, last + 1  # it still blocks from ``low`` on, and not from ``high`` on
+    def blocked(k: int, a: int, b: int) -> bool:
+        there = {**steps, k: (a, b)}
+        some = tuple(only_between(obstacles[i], *there[i]) for i in sorted(there))
+        return asked.repair(among(prepared, some), proofs=False) is None
+
+    try:
+        for k in kept:
+            steps[k] = shortest(partial(blocked, k), last)
+            found[k] = steps[k][0] * dt, steps[k][1] * dt
+    except Cut:
+        pass
+    return found
+
+
+def shortest(blocked: Callable[[int, int], bool], last: int) -> tuple[int, int]:
+    """First and last step of a while that still blocks, by halving.
+
+    Parameters
+    ----------
+    blocked : callable
+        Whether it blocks from a step to another one; from 0 to ``last`` it does.
+    last : int
+    """
+    low, high = 0, last + 1  # it still blocks from ``low`` on, and not from ``high`` on
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if blocked(middle, last) else (low, middle)
@@ -194,4 +222,4 @@ def _span(prepared: Prepared, asked: Asked, obstacles: tuple[Any, ...]) -> tuple
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if blocked(first, middle) else (middle, high)
-    return first * dt, high * dt
+    return first, high
