@@ -79,6 +79,19 @@ def test_a_car_that_crosses_is_avoided_from_the_f_ttr_on(cases):
     assert driven.states["x"][:before] == pytest.approx(driven.states["plan_x"][:before], abs=1e-6)
 
 
+def test_the_oracle_looks_to_the_end_of_the_record_and_nobody_else(cases):
+    case = cases["scenario_1"]
+    record = case.world.n_steps
+    assert record * case.world.dt > 5.0 + 1e-9
+    ahead = {
+        name: case.grounds(name).beliefs.ahead(0) for name in ("recorded", "constant_velocity", "delayed")
+    }
+    assert ahead == {"recorded": record, "constant_velocity": 50, "delayed": 50}
+    config = replace(case.config, simulate=replace(case.config.simulate, lookahead=3.0))
+    asked = Case(case.plan, case.world, config, case.never)
+    assert {asked.grounds(name).beliefs.ahead(0) for name in ahead} == {30}
+
+
 def test_a_gentle_repair_is_gentle(cases):
     driven = cases["scenario_1"].drive("recorded", "graded")
     assert driven.struck is None

@@ -16,7 +16,13 @@ class SimulateConfig:
     period: float | None = setting(
         None, "from cycle to cycle [s], whole steps; null: the scenario's step", low=1e-3, high=10.0
     )
-    lookahead: float = setting(5.0, "how far ahead conflicts are looked for [s]", low=0.5, high=60.0)
+    lookahead: float | None = setting(
+        None,
+        "how far ahead conflicts are looked for [s]; null: 5 s, and with the prediction recorded to the "
+        "record's end",
+        low=0.5,
+        high=60.0,
+    )
     trigger: str = setting(
         "contact",
         "what of a predicted conflict counts: contact, or the margin (checker.clearance) entered; once off "

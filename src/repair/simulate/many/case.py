@@ -26,6 +26,7 @@ from repair.timegrid import steps_until
 
 __all__ = ["Case", "Plan", "case_at", "plan_on", "simulation_config"]
 
+_LOOKAHEAD = 5.0  # where the configuration does not say [s]
 _LEAST = 1.0  # a drive that is shorter says nothing [s]
 _GRID = 0.1  # the F-TTR is looked for on this grid, at least a step [s]
 #: What a simulation has where nothing else is asked for: cycles are short.
@@ -137,8 +138,10 @@ class Case:
 
 
 def _grounds(plan: Plan, world: World, config: Config, prediction: str) -> Grounds:
-    lookahead = max(steps_until(config.simulate.lookahead, world.dt), 3)
-    beliefs = Beliefs(world, make_predictor(prediction, config.simulate), lookahead)
+    predictor, lookahead = make_predictor(prediction, config.simulate), config.simulate.lookahead
+    if lookahead is None:
+        lookahead = world.n_steps * world.dt if getattr(predictor, "to_the_end", False) else _LOOKAHEAD
+    beliefs = Beliefs(world, predictor, max(steps_until(lookahead, world.dt), 3))
     return Grounds(plan.scene, config, beliefs, plan.hard, plan.gentle)
 
 

@@ -20,6 +20,7 @@ class Recorded:
     """Everybody does what was recorded: nothing is left to believe."""
 
     looks_ahead: ClassVar[bool] = True
+    to_the_end: ClassVar[bool] = True
 
     def predict(self, known: Known) -> Obstacle | None:
         """The record from now on; also of those that are to come."""
