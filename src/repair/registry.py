@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
-from repair.errors import RepairError
+from repair.errors import RepairError, kind_of
 
-__all__ = ["Part", "Registry", "adopt", "loaded", "registered"]
+__all__ = ["Part", "Registry", "adopt", "called", "loaded", "registered"]
 
 T = TypeVar("T")
 
@@ -32,6 +32,8 @@ class Registry(Generic[T]):
     group : str, optional
         Entry-point group in which installed packages offer more of them. An entry point that cannot be
         loaded is kept with its reason, and is an error only for who asks for it.
+    admit : callable, optional
+        Makes a thing of what an entry point names; what it raises is the reason why that is none.
     """
 
     def __init__(
@@ -41,8 +43,9 @@ class Registry(Generic[T]):
         *,
         error: type[RepairError] = RepairError,
         group: str | None = None,
+        admit: Callable[[Any], T] | None = None,
     ) -> None:
-        self.kind, self.error, self.group = kind, error, group
+        self.kind, self.error, self.group, self._admit = kind, error, group, admit
         self._own = dict(own)
         self._registered: dict[str, T] = {}
         self._offered: dict[str, T] | None = None
@@ -111,10 +114,26 @@ class Registry(Generic[T]):
                 self._broken[name] = f"the package has a {self.kind} of that name itself"
                 continue
             try:
-                found[name] = point.load()
+                thing = point.load()
+                found[name] = thing if self._admit is None else self._admit(thing)
+            except RepairError as error:
+                self._broken[name] = str(error)
             except Exception as error:  # whatever a foreign package raises on import
                 self._broken[name] = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         return found
+
+
+def called(thing: Any) -> Any:
+    """A thing of an installed package that is called: a function, or a class.
+
+    Raises
+    ------
+    RepairError
+        If it cannot be.
+    """
+    if not callable(thing):
+        raise RepairError(f"it is {kind_of(thing)}, which cannot be called")
+    return thing
 
 
 def loaded(thing: str | T) -> T:

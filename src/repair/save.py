@@ -25,7 +25,7 @@ from repair.io.trace.planning import trace_bytes
 from repair.io.trace.verdict import verdict_bytes
 from repair.mitigation.mitigate import Mitigation
 from repair.outcome.data import Outcome
-from repair.registry import Registry, loaded
+from repair.registry import Registry, called, loaded
 from repair.report.style import FORMATS as FIGURE_FORMATS
 from repair.report.style import FigureStyle, render
 from repair.scene.scene import Scene
@@ -243,6 +243,7 @@ FORMATS: Registry[Format] = Registry(
     },
     error=OutputError,
     group="repair.formats",
+    admit=called,
 )
 
 

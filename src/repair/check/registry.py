@@ -10,7 +10,7 @@ from repair.check.verdict import Violation
 from repair.curves.plane import CartesianPath
 from repair.errors import ConfigError, foreign, in_words, kind_of
 from repair.problem.problem import RepairProblem
-from repair.registry import Registry
+from repair.registry import Registry, called
 from repair.vehicle.states import DrivenStates
 
 __all__ = ["CHECKS", "Check", "Driven", "register", "violations_of"]
@@ -41,7 +41,7 @@ class Driven:
 #: Says what is wrong with a driven trajectory; nothing where it is good.
 Check = Callable[[Driven], Sequence[Violation]]
 
-CHECKS: Registry[Check] = Registry("check", {}, error=ConfigError, group="repair.checks")
+CHECKS: Registry[Check] = Registry("check", {}, error=ConfigError, group="repair.checks", admit=called)
 
 
 def register(name: str, check: Check) -> None:

@@ -170,7 +170,10 @@ def _schema_of(own: tuple[tuple[str, type], ...]) -> Any:
     from omegaconf.errors import OmegaConfBaseException
 
     try:
-        return OmegaConf.structured(_type_of(own))
+        made = OmegaConf.structured(_type_of(own))
+        for name, _ in own:
+            OmegaConf.set_readonly(made[name], False)  # of a frozen dataclass: it is made, and not changed
+        return made
     except (OmegaConfBaseException, ValueError, TypeError) as error:
         raise ConfigError(f"a backend's settings cannot be part of the configuration: {error}") from error
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from repair.errors import ConfigError, foreign
 from repair.metrics.base import Asked, Metric, MetricValue
-from repair.registry import Registry, loaded
+from repair.registry import Registry, called, loaded
 
 __all__ = ["METRICS", "measure", "register"]
 
@@ -20,6 +20,7 @@ METRICS: Registry[Metric | str] = Registry(
     },
     error=ConfigError,
     group="repair.metrics",
+    admit=called,
 )
 
 

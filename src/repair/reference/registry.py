@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from repair.errors import ConfigError, ReferenceTrajectoryError, foreign, in_wor
 from repair.reference.base import Along, AsRecorded, MakeReference, ReferenceSource, Track
 from repair.reference.fit import deviation
 from repair.reference.recorded import known_until
-from repair.registry import Registry, loaded
+from repair.registry import Registry, called, loaded
 from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
@@ -34,6 +34,12 @@ __all__ = [
 
 _FOLLOWED = (1e-3, 1e-2, 2e-3)  # what is followed to within less than this is followed [m], [m/s], [rad]
 _SPEED_OFF = 0.05  # a start this much faster or slower than the planning problem's is said [m/s]
+
+
+def _admitted(thing: Any) -> ReferenceSource:
+    """What an installed package offers: a source, or what makes its curve."""
+    return thing if isinstance(thing, ReferenceSource) else ReferenceSource(called(thing))
+
 
 SOURCES: Registry[ReferenceSource] = Registry(
     "reference source",
@@ -64,6 +70,7 @@ SOURCES: Registry[ReferenceSource] = Registry(
     },
     error=ConfigError,
     group="repair.references",
+    admit=_admitted,
 )
 
 

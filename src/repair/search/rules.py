@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 
 from repair.errors import ConfigError
-from repair.registry import Registry
+from repair.registry import Registry, called
 from repair.timegrid import ROUNDING, intervals
 
 __all__ = ["CONTIGUOUS", "RULES", "IsOpen", "Order", "Rule", "around", "from_the_end", "probe_order"]
@@ -130,6 +130,7 @@ RULES: Registry[Rule] = Registry(
     {"bisect": _bisect, "guided": _guided, "scan": _scan, "as_printed": _as_printed},
     error=ConfigError,
     group="repair.rules",
+    admit=called,
 )
 
 

@@ -1,7 +1,8 @@
 """Backends by name; a module is imported when its backend is asked for.
 
 A further backend is one module and one line here, or :func:`register` from outside, or an entry point of
-an installed package: group ``repair.backends``, each a :class:`repair.backend.base.BackendSpec`.
+an installed package: group ``repair.backends``, each a :class:`repair.backend.base.BackendSpec`, or what
+makes the backend where it has no section.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from typing import Any
 from repair.backend.base import BackendSpec, Capabilities, Configuration, RepairBackend
 from repair.baselines.qptr.settings import QptrConfig
 from repair.deadline import in_time
-from repair.errors import BackendError
-from repair.registry import Registry, loaded
+from repair.errors import BackendError, foreign, in_words
+from repair.registry import Registry, called, loaded
 from repair.solvers.casadi.settings import CasadiConfig
 from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.portfolio.settings import PortfolioConfig
@@ -29,6 +30,27 @@ __all__ = [
 ]  # fmt: skip
 
 _IMPORT = 0.05  # [s] what importing a backend may take, the packages that it needs being there
+
+
+def _admitted(thing: Any) -> BackendSpec:
+    """What an installed package offers: a specification, or what makes the backend, without a section.
+
+    Raises
+    ------
+    BackendError
+        If it is neither, or its section cannot be made. Whoever asks for another backend is not to know.
+    """
+    if not isinstance(thing, BackendSpec):
+        return BackendSpec(called(thing), None, (), "of an installed package")
+    if thing.settings is not None:
+        if not is_dataclass(thing.settings):
+            raise BackendError(f"its settings have to be a dataclass, not {in_words(thing.settings)}")
+        from omegaconf import OmegaConf
+
+        with foreign("making its settings", BackendError):
+            OmegaConf.structured(thing.settings())
+    return thing
+
 
 BACKENDS: Registry[BackendSpec] = Registry(
     "backend",
@@ -71,6 +93,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
     },
     error=BackendError,
     group="repair.backends",
+    admit=_admitted,
 )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 
 from repair.arrays import Array
-from repair.errors import ConfigError
+from repair.errors import ConfigError, kind_of
 from repair.registry import Registry
 from repair.vehicle.commonroad_ks import official_check, to_ks_states
 from repair.vehicle.parameters import VEHICLE_NAMES, Vehicle, load_vehicle
@@ -131,11 +131,28 @@ def _commonroad(type_id: int) -> Callable[[], VehicleModel]:
     return lambda: KinematicSingleTrack(load_vehicle(type_id))
 
 
+def _made(vehicle: Any) -> Callable[[], VehicleModel]:
+    """Makes a vehicle of parameters, of a model, or of what makes either.
+
+    Raises
+    ------
+    ConfigError
+        If that is none; where something else makes it, when it is asked for.
+    """
+    if isinstance(vehicle, type) or (callable(vehicle) and not isinstance(vehicle, VehicleModel)):
+        return lambda: _made(vehicle())()  # noqa: PLW0108 - only when it is asked for
+    model = KinematicSingleTrack(vehicle) if isinstance(vehicle, Vehicle) else vehicle
+    if not isinstance(model, VehicleModel):
+        raise ConfigError(f"a vehicle is expected, and {kind_of(vehicle)} is none")
+    return lambda: model
+
+
 VEHICLES: Registry[Callable[[], VehicleModel]] = Registry(
     "vehicle",
     {name: _commonroad(type_id) for type_id, name in VEHICLE_NAMES.items()},
     error=ConfigError,
     group="repair.vehicles",
+    admit=_made,
 )
 
 

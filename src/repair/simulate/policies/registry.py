@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from repair.config.simulate import SimulateConfig
 from repair.errors import ConfigError, foreign
-from repair.registry import Registry, loaded
+from repair.registry import Registry, called, loaded
 from repair.simulate.policies.base import Policy
 from repair.simulate.policies.sudden import AtOnce, BelowTtc, Brake, Never
 from repair.simulate.policies.waiting import AtFttr, Graded
@@ -28,6 +28,7 @@ POLICIES: Registry[MakePolicy | str] = Registry(
     },
     error=ConfigError,
     group="repair.policies",
+    admit=called,
 )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from repair.config.simulate import SimulateConfig
 from repair.errors import ConfigError, foreign
-from repair.registry import Registry, loaded
+from repair.registry import Registry, called, loaded
 from repair.simulate.predictions.base import Predictor
 
 __all__ = ["PREDICTIONS", "make_predictor", "register"]
@@ -56,6 +56,7 @@ PREDICTIONS: Registry[MakePredictor | str] = Registry(
     },
     error=ConfigError,
     group="repair.predictions",
+    admit=called,
 )
 
 
