@@ -271,6 +271,16 @@ def tampered(told, what):
         column["speed_mps"] = [v - 3.0 * t for v, t in zip(column["speed_mps"], column["t_s"], strict=True)]
     elif what == "ends":
         one.update(ends="none", contact_t_s=None)
+    elif what == "ends alone":
+        one["ends"] = "none"
+    elif what == "nothing is hit until then":
+        one.update(ends="none", contact_t_s=None, looked_until_s=column["t_s"][-1])
+    elif what == "from behind":
+        one["from_behind"] = not one["from_behind"]
+    elif what == "needs":
+        one["proven"] = "contact_or_off_road" if one["proven"] == "contact" else "contact"
+    elif what == "no full braking":
+        one["full_braking"] = None
     elif what == "status":
         told["status"] = "none_feasible"
     elif what == "proof":
@@ -299,6 +309,7 @@ def test_certified_and_not_when_tampered_with(tmp_path):
     told = file.read_text(encoding="utf-8")
     for what in (
         "impact speed", "full braking", "contact", "obstacle", "place", "grip", "ends", "status", "proof",
+        "ends alone", "nothing is hit until then", "from behind", "needs", "no full braking",
     ):  # fmt: skip
         file.write_text(json.dumps(tampered(json.loads(told), what)), encoding="utf-8")
         assert not certify(out).ok, what

@@ -12,6 +12,7 @@ import numpy as np
 
 from repair.certify.certificate import CertificateRow, at_most, said
 from repair.certify.contact import first_meeting
+from repair.certify.late.rows import read_proofs
 from repair.certify.limits import physical_rows
 from repair.certify.motion import Motion, States, states_of, through_states
 from repair.certify.plane import beyond_the_road, road_of
@@ -19,6 +20,7 @@ from repair.certify.solution import columns_row, only_states, start_rows
 from repair.certify.traffic import Body, Traffic
 from repair.errors import RepairError
 from repair.io.official import check_solution_file
+from repair.timegrid import steps_until
 
 if TYPE_CHECKING:
     from repair.preparation import Prepared
@@ -27,6 +29,7 @@ __all__ = ["impact_rows", "status_row"]
 
 _TIME = 8e-3  # by which an impact may come at another time: states against the curve, and a millisecond [s]
 _SPEED = 0.15  # by which its speed may differ: hard braking for that time [m/s]
+_CLEAR = 0.2  # nearer to the middle of the rear half, or slower, is too close to call [m], [m/s]
 _EDGE = 0.03  # the edge of the road is looked at in samples by who says when it is left [s]
 
 
@@ -77,20 +80,37 @@ def impact_rows(
         road = road_of(anew.scenario, float(prepared.config.checker.road_gap))
     rows: list[CertificateRow] = []
     full = told.get("full_braking")
+    looked = float(told["looked_until_s"])
+    least = min(prepared.t_end, steps_until(prepared.scene.horizon, prepared.scene.dt) * prepared.scene.dt)
+    rows.append(
+        said("record: impacts are looked for until then", looked >= least - 1e-6, "files", f"{looked:g} s")
+    )
+    rows.append(said("record: what the proof needs", told["proven"] == _needed(folder, content), "files"))
     for name, one in (("mitigation", told), ("full braking", full)):
         if one is not None:
-            made = _rows(one, prepared, problem, traffic, road)
+            made = _rows(one, prepared, problem, traffic, road, looked)
             rows += [replace(row, name=f"{name}: {row.name}") for row in made]
     if full is not None:
         best, other = float(told["impact_speed_mps"]), float(full["impact_speed_mps"])
         rows.append(at_most("impact speed, full braking's the limit", best, other, "files", "m/s"))
         off = abs(float(told["gained_mps"]) - max(other - best, 0.0))
         rows.append(at_most("record: gained off by", off, 0.0, "files", "m/s", 1e-5))
+    elif told["gained_mps"] is not None:
+        rows.append(said("record: gained", False, "files", "full braking is missing"))
     return [*rows, *_file_rows(folder, told, prepared, problem)]
 
 
+def _needed(folder: Path, content: Mapping[str, Any]) -> str | None:
+    """What the proof that nothing avoids it is about; None where there is none for the vehicle at 0."""
+    bound = content.get("bound") or {}
+    if ((bound.get("kinds") or {}).get("vehicle") or {}).get("t_bound_s") != 0.0:
+        return None
+    places = read_proofs(folder / str(bound["proof_file"]))[0]["kinds"]["vehicle"]["places"]
+    return "contact_or_off_road" if any(one["obstacle"] < 0 for one in places) else "contact"
+
+
 def _rows(
-    one: Mapping[str, Any], prepared: Prepared, problem: Any, traffic: Traffic, road: Any
+    one: Mapping[str, Any], prepared: Prepared, problem: Any, traffic: Traffic, road: Any, looked: float
 ) -> Iterator[CertificateRow]:
     """Of one motion."""
     scene, dt = prepared.scene, prepared.scene.dt
@@ -104,7 +124,11 @@ def _rows(
     yield from start_rows(states, problem, vehicle, given=prepared.config.reference.source == "file")
     yield from physical_rows(states, dt, vehicle)
     ends, time = str(one["ends"]), _time(one)
-    yield said("lasts until its impact", float(motion.t[-1]) >= min(time, _last(one, motion)) - 1e-9, "files")
+    if (ends == "none") != (one["contact_t_s"] is None) or ends not in ("contact", "off_road", "none"):
+        yield said("how it ends", False, "files", ends)
+        return
+    until = looked - dt if ends == "none" else time  # to the step
+    yield said("lasts until its impact", float(motion.t[-1]) >= until - 1e-9, "files")
     met = first_meeting(motion, half, traffic.bodies, dt)
     since = math.inf if road is None else beyond_the_road(motion, *half, road)[0]
     if ends == "contact":
@@ -116,6 +140,7 @@ def _rows(
             f"s, obstacle {met.obstacle_id}",
         )  # fmt: skip
         yield from _speed_rows(one, motion, traffic.bodies, dt)
+        yield from _behind_rows(one, motion, traffic.bodies, dt, vehicle.length)
     else:
         free = met.time >= min(time, float(motion.t[-1])) - _TIME
         yield said("nothing is touched before", free, "continuous", f"s, obstacle {met.obstacle_id}")
@@ -132,11 +157,6 @@ def _rows(
 
 def _time(one: Mapping[str, Any]) -> float:
     return math.inf if one["contact_t_s"] is None else float(one["contact_t_s"])
-
-
-def _last(one: Mapping[str, Any], motion: Motion) -> float:
-    """Until when a motion has to last that hits nothing: until its own end."""
-    return float(motion.t[-1]) if one["ends"] == "none" else math.inf
 
 
 def _velocity(motion: Motion, time: float) -> complex:
@@ -171,6 +191,30 @@ def _speed_rows(
     speed = min(found, key=lambda value: abs(value - told))
     off = abs(speed - told)
     yield at_most("impact speed off by", off, 0.0, "recomputed", f"m/s, of {speed:.2f} m/s", _SPEED)
+
+
+def _behind_rows(
+    one: Mapping[str, Any], motion: Motion, bodies: Sequence[Body], dt: float, length: float
+) -> Iterator[CertificateRow]:
+    """Whether it is struck from behind: behind the middle of its rear half, by who closes in.
+
+    Of a body of several parts, and where it is too close to call, nothing is said.
+    """
+    time = _time(one)
+    parts = [body for body in bodies if body.id == one["obstacle_id"]]
+    k = math.floor((time + _TIME) / dt)
+    here, there = (_centre(parts[0], step) if len(parts) == 1 else None for step in (k, k + 1))
+    if here is None:
+        return
+    centre = here if there is None else here + (time / dt - k) * (there - here)
+    x, y, yaw = (float(np.interp(time, motion.t, column)) for column in motion.poses.T)
+    axis, own = complex(math.cos(yaw), -math.sin(yaw)), _velocity(motion, time)
+    beyond = -0.25 * length - ((centre - complex(x, y)) * axis).real
+    closing = [((theirs - own) * axis).real for theirs in _theirs(parts[0], time, dt)]
+    if min(abs(beyond), *(abs(v) for v in closing)) < _CLEAR or min(closing) < 0.0 < max(closing):
+        return
+    behind = beyond > 0.0 and closing[0] > 0.0
+    yield said("struck from behind", bool(one["from_behind"]) == behind, "recomputed", str(behind).lower())
 
 
 def _theirs(body: Body, time: float, dt: float) -> list[complex]:

@@ -27,7 +27,7 @@ from repair.vehicle.model import KinematicSingleTrack
 if TYPE_CHECKING:
     from repair.preparation import Prepared
 
-__all__ = ["late_rows"]
+__all__ = ["late_rows", "read_proofs"]
 
 _ROUNDING = 1e-6  # [m] by which a shape may be outside of what it stands for: files hold micrometres
 _STEP = 0.025  # over which the reference's acceleration is looked at [s]
@@ -66,7 +66,7 @@ def late_rows(
     if not told:
         return []
     claims = {k: float(one["t_bound_s"]) for k, one in told["kinds"].items() if one["t_bound_s"] is not None}
-    proofs, written = _read(folder / str(told["proof_file"])) if claims else ({}, None)
+    proofs, written = read_proofs(folder / str(told["proof_file"])) if claims else ({}, None)
     taken = _Taken(prepared, scenario, traffic)
     rows = []
     for kind, time in claims.items():
@@ -100,7 +100,7 @@ def _consistent(content: Mapping[str, Any], claims: Mapping[str, float], prepare
     return bool(kept) and told["proven_optimal"] == (upper - f_ttr <= grid + 1e-9)
 
 
-def _read(file: Path) -> tuple[Any, str]:
+def read_proofs(file: Path) -> tuple[Any, str]:
     """What a file of proofs holds, and its checksum."""
     try:
         written = file.read_bytes()
