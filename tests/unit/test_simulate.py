@@ -261,6 +261,26 @@ def test_who_is_struck_and_how():
 # -- rows -------------------------------------------------------------------------------------------
 
 
+def test_the_impact_is_that_of_the_step_that_leads_to_it():
+    """Who brakes is met at the end of a step, and at the place where it is then."""
+    ego = np.column_stack([np.linspace(0.0, 40.0, 201), np.zeros((201, 2)), np.full(201, 10.0)])
+    states = straight(v=5.0, steps=40)
+    length = VEHICLE.half_length + 2.2
+    states[:, 0] = length + 9.99  # stands from 1 s on, and is touched then
+    states[:10, 0] -= np.arange(10, 0, -1) * DT * 5.0
+    found = first_struck([body(states)], ego, SIZE, DT)
+    assert found.time == pytest.approx(1.0)
+    assert found.speed == pytest.approx(5.0)
+    # 40 m/s and 5 m/s aside: at the beginning of the step its middle was behind, at the contact it is beside
+    t = np.arange(41) * DT
+    aside = straight(v=40.0, steps=40)
+    meets, sides = 0.98, VEHICLE.half_width + 0.9
+    aside[:, 0], aside[:, 1] = 10.0 * meets + 40.0 * (t - meets), sides + 5.0 * (meets - t) - 1e-3
+    found = first_struck([body(aside)], ego, SIZE, DT)
+    assert found.time == pytest.approx(meets)
+    assert not found.from_behind
+
+
 def driven(speeds, cycles=(), struck=None, distance=1.0, offset=0.0) -> Driven:
     speeds = np.asarray(speeds, dtype=float)
     x = np.append(0.0, np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * DT))

@@ -168,12 +168,12 @@ def _shape(one: Obstacle, k: int, per: int) -> Any:
 
 
 def _moving(one: Obstacle, k: int, per: int, dt: float) -> tuple[Array, Array]:
-    """Centre [m] and velocity [m/s] of an obstacle at a sample."""
-    low = min(k // per, len(one.states) - 1)
-    high = min(low + 1, len(one.states) - 1)
-    first = max(high - 1, 0)
-    centre = one.states[low, :2]
-    velocity = (one.states[high, :2] - one.states[first, :2]) / dt if high > first else np.zeros(2)
-    if not np.isfinite(velocity).all():
-        velocity = np.zeros(2)
-    return centre, velocity
+    """Centre [m] and velocity [m/s] of an obstacle at a sample, by the step that leads there."""
+    places, last = one.states[:, :2], len(one.states) - 1
+    high = min(max(-(-k // per), 1), last)
+    for low, there in ((max(high - 1, 0), high), (high, min(high + 1, last))):  # it may appear just then
+        change = places[there] - places[low]
+        if np.isfinite(change).all():
+            share = min(max(k / per - low, 0.0), 1.0)
+            return places[low] + share * change, change / dt
+    return places[min(k // per, last)], np.zeros(2)
