@@ -166,9 +166,10 @@ def _visit(
             probe, rejected, source,
             lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
         )  # fmt: skip
+    nobody = False
     try:
         if not probe.feasible and not budget.spent:  # cheaper than all margins, and mostly it is what helps
-            probe = _helped(probe, first, source, backend, checker, sides, budget)
+            probe, nobody = _helped(probe, first, source, backend, checker, sides, budget)
     except OutOfTime:
         budget.cut = True
     # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow, and past larger ones
@@ -177,7 +178,7 @@ def _visit(
     others: list[Iterable[Sequence[RepairProblem]]] = []
     if tightens and too_close(rejected):
         others.append(other_ways(first, source.widened(t_rep)))
-    if backend.capabilities.relaxes:
+    if backend.capabilities.relaxes and not nobody:
         others.append(source.relaxed(t_rep))
     try:
         for problems in itertools.chain.from_iterable(others):
@@ -213,12 +214,19 @@ def _helped(
     checker: TrajectoryChecker,
     sides: str,
     budget: Budget,
-) -> Probe:
+) -> tuple[Probe, bool]:
     """The backend asked once more, from a curve of a helper that the checker accepts; one after the other.
 
     A hard backend gives up where its guides or its boxes leave it nothing; what has been verified proves that
     there is a way. The helper's curve itself is no answer: it may keep less than this backend claims.
+
+    Returns
+    -------
+    probe : Probe
+    nobody : bool
+        A helper that needs no way to be shown has looked among the true shapes, and found nothing.
     """
+    nobody = False
     helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
     for make in helpers.values():
         if probe.feasible or budget.spent:
@@ -231,8 +239,9 @@ def _helped(
         except OutOfTime as late:  # the search goes on without
             probe = replace(probe, tried=(*probe.tried, f"no other backend asked: {late}"))
         else:
-            probe = _helped_by(helper, probe, first, source, backend, checker, sides, budget)
-    return probe
+            probe, found = _helped_by(helper, probe, first, source, backend, checker, sides, budget)
+            nobody |= helper.capabilities.own_way and not found and not budget.cut
+    return probe, nobody
 
 
 def _helped_by(
@@ -244,13 +253,13 @@ def _helped_by(
     checker: TrajectoryChecker,
     sides: str,
     budget: Budget,
-) -> Probe:
-    """As :func:`_helped`, of one helper."""
+) -> tuple[Probe, bool]:
+    """As :func:`_helped`, of one helper; and whether that has found anything."""
     t_rep, can = probe.t_rep, helper.capabilities
     problems = source.without_guide(t_rep) if can.own_way else first
     found = _visit(t_rep, problems, source, helper, checker, sides, None, budget)
     if not found.feasible or found.solve.curve is None:
-        return probe
+        return probe, False
     along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD, jumps=can.jumps)
     curve = found.solve.curve
     again = probe_one(t_rep, along, backend, checker, curve, budget)
@@ -263,11 +272,10 @@ def _helped_by(
     tried = (*probe.tried, f"{words(again)} ({said})")
     if again.feasible:
         usual = along.reference.sample([t_rep]).acceleration[0]
-        return replace(again, tried=tried, jump=max(abs(along.start[2] - usual).tolist()))
+        return replace(again, tried=tried, jump=max(abs(along.start[2] - usual).tolist())), True
     why = again.solve.detail if again.solve.curve is None else words(again)
-    return replace(
-        probe, tried=tried, solve=replace(probe.solve, detail=f"{probe.solve.detail}; {said}: {why}")
-    )
+    told = replace(probe.solve, detail=f"{probe.solve.detail}; {said}: {why}")
+    return replace(probe, tried=tried, solve=told), True
 
 
 def _given(visits: Sequence[float]) -> Order:
