@@ -121,6 +121,41 @@ def test_a_helpers_curve_is_no_answer_by_itself_and_the_reason_is_said():
     assert all("soft" not in text for probe in nothing.probes for text in probe.tried)
 
 
+class Laddered(Source):
+    """Says which times other margins were asked for at."""
+
+    def __init__(self):
+        super().__init__()
+        self.ladder = []
+
+    def relaxed(self, t_rep):
+        self.ladder.append(t_rep)
+        return ()
+
+
+class Blind(Soft):
+    """Finds nothing, by its own way or by one that it is shown."""
+
+    def __init__(self, own_way):
+        self.capabilities = Capabilities(own_way=own_way)
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        return SolveResult(SolveStatus.INFEASIBLE)
+
+
+@pytest.mark.parametrize(
+    "helper, asked",
+    [(lambda: Blind(own_way=True), False), (lambda: Blind(own_way=False), True), (Soft, True), (None, True)],
+    ids=["own way, nothing", "shown way, nothing", "a curve", "nobody"],
+)
+def test_other_margins_are_not_asked_for_where_somebody_has_looked_everywhere(helper, asked):
+    source = Laddered()
+    helpers = {} if helper is None else {"helper": helper}
+    backend = Hard(Capabilities(relaxes=True, helpers=helpers), near=False)
+    assert search(backend, source).f_ttr is None
+    assert bool(source.ladder) is asked
+
+
 def test_without_time_to_make_the_helper_the_search_goes_on_without():
     def late():
         raise OutOfTime("importing takes long")

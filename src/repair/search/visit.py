@@ -1,0 +1,154 @@
+"""One time-to-repair from every side: first problems, tightened ones, a helper's curve, other margins."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from repair.backend.base import RepairBackend
+from repair.curves.base import Curve
+from repair.deadline import OutOfTime
+from repair.problem.problem import Maneuver, RepairProblem
+from repair.search.again import other_ways, probe_again, too_close
+from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides, words
+from repair.search.result import Probe
+
+__all__ = ["visit"]
+
+_HELP = 0.05  # [s] below which a helper is not asked: laying out its task alone may take as long
+
+
+def visit(
+    t_rep: float,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    warm_start: Curve | None,
+    budget: Budget,
+) -> Probe:
+    """One t_rep, with its first problems and then with other margins."""
+    budget.cut = False
+    probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
+    if probe.feasible:
+        return probe
+    if (backend.capabilities.relaxes or backend.capabilities.helpers) and _hopeless(t_rep, budget):
+        return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
+    tightens = any(source.notches)
+    if tightens:
+        probe = probe_again(
+            probe, rejected, source,
+            lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
+        )  # fmt: skip
+    nobody = False
+    try:
+        if not probe.feasible and not budget.spent:  # cheaper than all margins, and mostly it is what helps
+            probe, nobody = _helped(probe, first, source, backend, checker, sides, budget)
+    except OutOfTime:
+        budget.cut = True
+    # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow, and past larger ones
+    # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
+    # a repair infeasible that the checker accepts.
+    others: list[Iterable[Sequence[RepairProblem]]] = []
+    if tightens and too_close(rejected):
+        others.append(other_ways(first, source.widened(t_rep)))
+    if backend.capabilities.relaxes and not nobody:
+        others.append(source.relaxed(t_rep))
+    try:
+        for problems in itertools.chain.from_iterable(others):
+            if probe.feasible:
+                break
+            if budget.spent:
+                budget.cut = True
+                break
+            again, _ = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
+            tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
+            probe = replace(again if again.feasible else probe, tried=tried)
+    except OutOfTime:  # while the next problems were made
+        budget.cut = True
+    return probe
+
+
+def _hopeless(t_rep: float, budget: Budget) -> bool:
+    """Whether it is proven that nothing is feasible at a t_rep; asked for backends that take their time."""
+    left = budget.left
+    if budget.hopeless is None or (left is not None and left < _HELP):
+        return False
+    try:
+        return budget.hopeless(t_rep)
+    except OutOfTime:  # whoever goes on sees it
+        return False
+
+
+def _helped(
+    probe: Probe,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    budget: Budget,
+) -> tuple[Probe, bool]:
+    """The backend asked once more, from a curve of a helper that the checker accepts; one after the other.
+
+    A hard backend gives up where its guides or its boxes leave it nothing; what has been verified proves that
+    there is a way. The helper's curve itself is no answer: it may keep less than this backend claims.
+
+    Returns
+    -------
+    probe : Probe
+    nobody : bool
+        A helper that needs no way to be shown has looked among the true shapes, and found nothing.
+    """
+    nobody = False
+    helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
+    for make in helpers.values():
+        if probe.feasible or budget.spent:
+            break
+        if (left := budget.left) is not None and left < _HELP:
+            budget.cut = True
+            break
+        try:
+            helper = make()
+        except OutOfTime as late:  # the search goes on without
+            probe = replace(probe, tried=(*probe.tried, f"no other backend asked: {late}"))
+        else:
+            probe, found = _helped_by(helper, probe, first, source, backend, checker, sides, budget)
+            nobody |= helper.capabilities.own_way and not found and not budget.cut
+    return probe, nobody
+
+
+def _helped_by(
+    helper: RepairBackend,
+    probe: Probe,
+    first: Sequence[RepairProblem],
+    source: ProblemSource,
+    backend: RepairBackend,
+    checker: TrajectoryChecker,
+    sides: str,
+    budget: Budget,
+) -> tuple[Probe, bool]:
+    """As :func:`_helped`, of one helper; and whether that has found anything."""
+    t_rep, can = probe.t_rep, helper.capabilities
+    problems = source.without_guide(t_rep) if can.own_way else first
+    found = visit(t_rep, problems, source, helper, checker, sides, None, budget)
+    if not found.feasible or found.solve.curve is None:
+        return probe, False
+    along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD, jumps=can.jumps)
+    curve = found.solve.curve
+    again = probe_one(t_rep, along, backend, checker, curve, budget)
+    if not again.feasible and any(source.notches):
+        again = probe_again(
+            again, [(along, again.verdict)], source,
+            lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), sides, budget,
+        )  # fmt: skip
+    said = f"from a curve of {helper.name} that passes every check"
+    tried = (*probe.tried, f"{words(again)} ({said})")
+    if again.feasible:
+        usual = along.reference.sample([t_rep]).acceleration[0]
+        return replace(again, tried=tried, jump=max(abs(along.start[2] - usual).tolist())), True
+    why = again.solve.detail if again.solve.curve is None else words(again)
+    told = replace(probe.solve, detail=f"{probe.solve.detail}; {said}: {why}")
+    return replace(probe, tried=tried, solve=told), True
