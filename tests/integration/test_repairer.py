@@ -7,6 +7,7 @@ import re
 import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,14 @@ import shapely
 from tests import roads
 
 import repair
+from repair.api import find
+from repair.backend.base import SolveResult, SolveStatus
 from repair.cycle.paced import Pace, Paced
+from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError, ScenarioError
+from repair.search.result import SearchStatus
+from repair.solvers.registry import make_backend
 
 DOCS = Path(__file__).parents[2] / "docs" / "planner.md"
 
@@ -69,6 +75,46 @@ def test_the_time_left_runs_down_and_never_jumps_back(scene, backend):
         until, kept = now + cycle.f_ttr, kept + cycle.kept
         assert until < now + cycle.ttc
     assert kept > 0
+
+
+class Late:
+    """A backend that finds nothing before some time-to-repair."""
+
+    name = "late"
+
+    def __init__(self, config, first):
+        self.own, self.first = make_backend("ego", config), first
+        self.capabilities = replace(self.own.capabilities, fallbacks=None)
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        if problem.t_rep < self.first:
+            return SolveResult(SolveStatus.INFEASIBLE)
+        return self.own.solve(problem, warm_start=warm_start, time_limit=time_limit)
+
+
+@pytest.mark.parametrize("guess", [None, 0.0])
+def test_nothing_is_said_to_be_feasible_only_where_all_has_been_tried(scene, guess):
+    prepared = (
+        repair.Repairer(scene, overrides=["search.delta_t=0.1", "fallback=[]"]).update(plan(scene)).prepared
+    )
+    settings = prepared.config.search
+    whole = find(prepared, Late(prepared.config, 0.5), settings=replace(settings, rule="scan"))
+    assert whole.f_ttr is not None
+    assert whole.f_ttr > 0.5
+    late = Late(prepared.config, 0.5)
+    assert searched(prepared, late, settings, guess=guess).f_ttr is None
+    thorough = searched(prepared, late, settings, guess=guess, thorough=True)
+    assert (thorough.status, thorough.f_ttr) == (SearchStatus.FOUND, pytest.approx(whole.f_ttr))
+    assert thorough.complete
+    assert len({round(probe.t_rep, 6) for probe in thorough.probes}) == len(thorough.probes)
+    never = searched(prepared, Late(prepared.config, 99.0), settings, guess=guess, thorough=True)
+    assert (never.status, never.complete) == (SearchStatus.NONE_FEASIBLE, True)
+    grid = np.arange(0.0, prepared.conflict.time - 1e-9, 0.1)
+    assert sorted(probe.t_rep for probe in never.probes) == pytest.approx(grid)
+    cut = searched(
+        prepared, Late(prepared.config, 99.0), replace(settings, time_limit=1e-9), guess=guess, thorough=True
+    )
+    assert (cut.status, cut.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
 
 
 def test_what_is_driven_touches_nothing(scene):

@@ -265,7 +265,7 @@ class Repairer:
                 guess = last.due(asked.now) if last is not None and refuted else None
                 found = searched(
                     prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
-                    guess if guess is not None and guess >= 0.0 else None,
+                    guess if guess is not None and guess >= 0.0 else None, thorough=True,
                 )  # fmt: skip
                 if found.probes:
                     longest = max(probe.check_time for probe in found.probes)

@@ -26,6 +26,8 @@ def searched(
     settings: SearchConfig,
     kept: float | None = None,
     guess: float | None = None,
+    *,
+    thorough: bool = False,
 ) -> SearchResult:
     """The F-TTR of a cycle.
 
@@ -39,7 +41,26 @@ def searched(
     guess : float, optional
         Where it was a cycle ago [s]; with a rule that takes feasibility to be contiguous the search begins
         there.
+    thorough : bool
+        Before nothing is said to be feasible, every point of the grid is tried, from the last one down: such
+        rules look no further where what they begin with is not.
     """
+    begin = time.perf_counter()
+    found = _searched(prepared, backend, settings, kept, guess)
+    nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
+    if thorough and nothing and settings.rule in _CONTIGUOUS:
+        return _the_rest(prepared, backend, settings, begin, found)
+    return found
+
+
+def _searched(
+    prepared: Prepared,
+    backend: RepairBackend,
+    settings: SearchConfig,
+    kept: float | None,
+    guess: float | None,
+) -> SearchResult:
+    """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
     end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
     if settings.rule not in _CONTIGUOUS:
         guess = None
@@ -73,6 +94,28 @@ def searched(
     return SearchResult(
         SearchStatus.FOUND, prepared.conflict, best.t_rep, best.solve.curve, probes, complete, spent
     )
+
+
+def _the_rest(
+    prepared: Prepared, backend: RepairBackend, settings: SearchConfig, begin: float, found: SearchResult
+) -> SearchResult:
+    """What a search that has found nothing has not visited."""
+    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
+    step, probes = settings.delta_t, found.probes
+    visited = {round(probe.t_rep / step) for probe in probes if not probe.fallback}
+    status, best = found.status, None
+    for k in (k for k in reversed(range(intervals(end, step))) if k not in visited):
+        one = find(prepared, backend, settings=_left(settings, begin), visits=(k * step,))
+        probes += one.probes
+        best = one.best
+        if best is not None or not one.complete:
+            status = SearchStatus.FOUND if best is not None else SearchStatus.BUDGET_EXHAUSTED
+            break
+    return SearchResult(
+        status, found.conflict, None if best is None else best.t_rep,
+        None if best is None else best.solve.curve, probes, status is not SearchStatus.BUDGET_EXHAUSTED,
+        time.perf_counter() - begin,
+    )  # fmt: skip
 
 
 def _left(settings: SearchConfig, begin: float) -> SearchConfig:
