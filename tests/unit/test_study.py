@@ -27,7 +27,7 @@ from repair.cli import main
 from repair.errors import OutputError, RepairError
 from repair.study.engine import LocalLanes, rows_of
 from repair.study.export import export
-from repair.study.plan import Study, Variation, labels_of, tasks_of
+from repair.study.plan import NO_MEMORY, Study, Variation, labels_of, tasks_of
 from repair.study.read import read_study
 from repair.study.rows import STUDY_COLUMNS, failed_row, strict, type_of, volatile
 from repair.study.run import Progress, estimate, run_study
@@ -357,22 +357,23 @@ def test_only_what_is_missing_is_made(study, tmp_path, capsys):
 
 def test_who_is_given_more_time_is_made_again(study, tmp_path):
     """And nobody else: neither what is there, nor what another limit would end as well."""
-    first, second, third = tasks_of(study)[:3]
+    first, second, third, fourth = tasks_of(study)[:4]
     with Store(tmp_path) as store:
-        store.plan([first, second, third])
+        store.plan([first, second, third, fourth])
         for task, status, detail in (
             (first, "timeout", first.too_late), (second, "memory", second.too_much), (third, "crash", "fell"),
+            (fourth, "memory", NO_MEMORY),
         ):  # fmt: skip
             row = failed_row(task.file, task.backend, task.reference, status, detail)
             store.add(task, strict(row | {"variation": task.variation}), None)
-        usual = [first, second, third]
+        usual = [first, second, third, fourth]
         assert run_study(usual, store, Here("one"), progress=False).made == 0
         longer = [replace(task, timeout=900.0) for task in usual]
-        assert estimate(longer, store, 1)[0] == 2
+        assert estimate(longer, store, 1)[0] == 3
         assert run_study(longer, store, Here("one"), progress=False).made == 1
         larger = [replace(task, memory=9000.0) for task in longer]
         assert run_study(larger, store, Here("one"), progress=False).made == 1
-        assert [row["status"] for row in store.rows()] == ["found", "found", "crash"]
+        assert [row["status"] for row in store.rows()] == ["found", "found", "crash", "memory"]
         assert run_study(usual, store, Here("one"), progress=False).made == 0
 
 

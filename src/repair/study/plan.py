@@ -16,6 +16,7 @@ from repair.errors import ConfigError, RepairError, ScenarioError, in_words
 from repair.study.rows import STUDY, Table
 
 __all__ = [
+    "NO_MEMORY",
     "Study",
     "Task",
     "Variation",
@@ -25,6 +26,9 @@ __all__ = [
     "require_possible",
     "tasks_of",
 ]
+
+#: What a row says that asked for memory which the machine did not have: no limit of the study.
+NO_MEMORY = "there was no memory left"
 
 
 @dataclass(frozen=True)
@@ -148,7 +152,7 @@ class Task:
     def still_lost(self, status: str, detail: str) -> bool:
         """Whether a row that is there would be lost again: no limit that ended it is another one now."""
         said = {"timeout": self.too_late, "memory": self.too_much}.get(status, detail)
-        return detail == said
+        return detail in (said, NO_MEMORY)
 
 
 def package_version() -> str:

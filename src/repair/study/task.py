@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repair.errors import BackendError, RepairError
-from repair.study.plan import Study, Task, tasks_of
+from repair.study.plan import NO_MEMORY, Study, Task, tasks_of
 from repair.study.rows import (
     STUDY_COLUMNS,
     SweepSettings,
@@ -136,7 +136,7 @@ def guarded(
         broken = isinstance(error, BackendError) and isinstance(error.__cause__, Exception)
         row = _failed(task, "crash" if broken else "input_error", one_line(error))
     except MemoryError:
-        row = _failed(task, "memory", "there was no memory left")
+        row = _failed(task, "memory", NO_MEMORY)
     except Exception as error:
         row = _failed(task, "crash", f"{type(error).__name__}: {one_line(error)}")
     row.update(variation=task.variation, row_time_s=round(time.perf_counter() - begin, 4))
