@@ -61,7 +61,7 @@ def _searched(
     guess: float | None,
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
-    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
+    end = _end(prepared, settings)
     if settings.rule not in _CONTIGUOUS:
         guess = None
     if (kept is None and guess is None) or not np.isfinite(end) or end <= 0.0:
@@ -100,7 +100,7 @@ def _the_rest(
     prepared: Prepared, backend: RepairBackend, settings: SearchConfig, begin: float, found: SearchResult
 ) -> SearchResult:
     """What a search that has found nothing has not visited."""
-    end = prepared.conflict.time if settings.upper is None else min(prepared.conflict.time, settings.upper)
+    end = _end(prepared, settings)
     step, probes = settings.delta_t, found.probes
     visited = {round(probe.t_rep / step) for probe in probes if not probe.fallback}
     status, best = found.status, None
@@ -116,6 +116,12 @@ def _the_rest(
         None if best is None else best.solve.curve, probes, status is not SearchStatus.BUDGET_EXHAUSTED,
         time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _end(prepared: Prepared, settings: SearchConfig) -> float:
+    """Until when there is anything to search [s]."""
+    end = prepared.conflict.time
+    return end if settings.upper is None else min(end, settings.upper)
 
 
 def _left(settings: SearchConfig, begin: float) -> SearchConfig:
