@@ -56,7 +56,8 @@ class RepairConfig:
     relax: list[float] = setting(
         factory=lambda: [-0.1, -0.3, -0.6, -1.3, -2.5],
         # Down to the vehicles' own extents, then into the boxes, which are wider than turning vehicles are.
-        says="margins [m] that hard backends try next where none of the manoeuvres is feasible",
+        says="margins [m] that hard backends try next where none of the manoeuvres is feasible; not where a "
+        "helper that needs no way to be shown has found nothing",
     )
     widen: list[float] = setting(
         factory=lambda: [0.3, 0.6],
