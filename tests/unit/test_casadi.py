@@ -20,6 +20,7 @@ from repair.solvers.casadi.backend import CasadiBackend
 from repair.solvers.casadi.buffered import Buffered, KeptBySize
 from repair.solvers.casadi.instance import lay_out, limit_values, plane_acceleration
 from repair.solvers.casadi.model import Model, Solution, build_model, megabytes
+from repair.solvers.casadi.nlp import _nonlinear
 from repair.solvers.casadi.residuals import residuals_of
 from repair.solvers.casadi.rows import RowKind
 from repair.solvers.casadi.separation import NOBODY, ROAD, SIDE_OF_BOUND, road_room, separate
@@ -194,8 +195,9 @@ def test_it_slows_down_for_a_bend(solver):
     assert np.hypot(lateral, samples.acceleration[:, 0]).max() <= 8.0 + 1e-6
 
 
-def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_circle(monkeypatch):
-    """With s alone SQP is not asked on a straight road; it is in a bend, and IPOPT always is."""
+@pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
+def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_others(monkeypatch, solver):
+    """No solver is asked on a straight road, and would have said the same; in a bend it is."""
     asked, solve = [], Model.solve
 
     def spy(self, *rest):
@@ -203,15 +205,44 @@ def test_the_optimum_of_the_linear_rows_is_the_answer_only_where_it_keeps_the_ci
         return solve(self, *rest)
 
     monkeypatch.setattr(Model, "solve", spy)
-    straight = problems.guided(toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(4.0, 0.0))], lateral=False))
-    found = [CasadiBackend(CasadiConfig(solver=name)).solve(straight) for name in ("sqpmethod", "ipopt")]
-    assert asked == ["ipopt"]
-    assert [r.status for r in found] == [SolveStatus.SOLVED] * 2
-    assert found[1].objective > 1.0
-    np.testing.assert_allclose(found[0].objective, found[1].objective, rtol=1e-5)
-    np.testing.assert_allclose(found[0].curve.points, found[1].curve.points, atol=1e-3)
-    CasadiBackend(CasadiConfig(solver="sqpmethod")).solve(bend())
-    assert "sqpmethod" in asked
+    backend = CasadiBackend(CasadiConfig(solver=solver))
+    slower = toy.problem([toy.box((20.0, 25.0), (-1.0, 1.0), v=(4.0, 0.0))], lateral=False)
+    for problem in (problems.guided(slower), problems.static_block_left()):
+        found = backend.solve(problem)
+        assert not asked
+        with monkeypatch.context() as patch:
+            patch.setattr("repair.solvers.casadi.backend._answered", lambda *_: False)
+            its_own = backend.solve(problem)
+        assert asked
+        asked.clear()
+        assert found.status is its_own.status is SolveStatus.SOLVED
+        assert found.objective > 1.0
+        np.testing.assert_allclose(found.objective, its_own.objective, rtol=1e-5)
+        np.testing.assert_allclose(found.curve.points, its_own.curve.points, atol=1e-3)
+    backend.solve(bend())
+    assert solver in asked
+
+
+def test_the_nonlinear_rows_are_those_of_the_nlp():
+    """What is computed without CasADi, against its own values: bounds in between are kept, or are not."""
+    problem = replace(
+        problems.static_block_left(), curvature=frozen([0.0, 0.02]), curvature_s=frozen([0.0, 50.0])
+    )
+    model = build_model(CasadiBackend().structure(problem))
+    instance, points = lay_out(problem, model)
+    x = casadi.SX.sym("x", len(model.unknowns(points)))
+    data = instance.sample_data(points)
+    m = len(points) - model.structure.degree
+    along, across, rest = _nonlinear(model, [x[:m], x[m:]], casadi.DM(data.T))
+    rows = casadi.Function("rows", [x], [casadi.vertcat(along**2 + across**2, across, *rest)])
+    value = np.asarray(rows(model.unknowns(points))).ravel()
+    linear = np.full(model.linear_count, np.nan)
+    for k in range(0, len(value), 7):
+        for shift, kept in ((1e-6, True), (-1e-6, False)):
+            high = np.full(len(value), np.inf)
+            high[k] = value[k] + shift
+            low = np.full(len(value), -np.inf)
+            assert instance.keeps_curved(points, np.append(linear, low), np.append(linear, high)) is kept
 
 
 # -- rows ------------------------------------------------------------------------------------------
@@ -328,13 +359,13 @@ def test_a_missing_plugin_is_a_status():
 )
 def test_other_words_of_the_solver_are_numerical_errors(monkeypatch, word):
     monkeypatch.setattr(Model, "solve", lambda self, x0, *rest: Solution(x0, word, 3, 0.0))
-    result = CasadiBackend().solve(problems.static_block())
+    result = CasadiBackend().solve(bend())
     assert result.status is SolveStatus.NUMERICAL_ERROR
     assert word in result.detail
 
 
 def test_what_the_solver_throws_is_a_status(monkeypatch):
-    backend, problem = CasadiBackend(spacing=0.31), problems.static_block()
+    backend, problem = CasadiBackend(spacing=0.31), bend()
 
     def throws(**keys):
         raise RuntimeError("first line\nthe plugin gave up")
@@ -352,7 +383,7 @@ def test_claimed_but_not_kept_is_a_numerical_error(monkeypatch):
         return Solution(x0 + np.linspace(0.0, 40.0, len(x0)), "Solve_Succeeded", 1, 0.0)
 
     monkeypatch.setattr(Model, "solve", lies)
-    result = CasadiBackend().solve(problems.static_block())
+    result = CasadiBackend().solve(bend())
     assert result.status is SolveStatus.NUMERICAL_ERROR
     assert result.curve is None
     assert "is violated by" in result.detail
@@ -361,7 +392,7 @@ def test_claimed_but_not_kept_is_a_numerical_error(monkeypatch):
 @pytest.mark.parametrize("solver", ["ipopt", "sqpmethod"])
 def test_it_keeps_quiet(solver, capfd):
     backend = CasadiBackend(CasadiConfig(solver=solver), spacing=0.27)
-    for make in (*problems.FEASIBLE.values(), problems.too_near):
+    for make in (*problems.FEASIBLE.values(), problems.too_near, bend):
         backend.solve(make())
     captured = capfd.readouterr()
     assert captured.out == ""

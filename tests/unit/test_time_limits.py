@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests import toy
 from tests.contract import problems
+from tests.unit.test_casadi import bend
 from tests.unit.test_search import FakeBackend, FakeChecker, FakeSource, search
 
 from repair.backend.base import SolveStatus
@@ -165,7 +166,7 @@ def test_an_nlp_is_not_made_where_there_is_no_time_for_it(solver, monkeypatch):
     monkeypatch.setattr(models, "make_nlp", lambda *a: made.append(a) or make(*a))
     for estimate in models._MADE.values():
         estimate.rate = 1.0
-    problem = problems.static_block_left()
+    problem = bend()  # one that the linear rows do not answer
     backend = CasadiBackend(CasadiConfig(solver=solver))
     begin = time.perf_counter()
     result = backend.solve(problem, time_limit=1.0)

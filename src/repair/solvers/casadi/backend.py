@@ -22,8 +22,8 @@ over s enter as lines around the last path; the NLP is solved again around its o
 trust region, until the exact values agree.
 
 The convex QP of all linear constraints is solved first, by daqp. Where it has no solution there is
-none; where, with s alone, its solution keeps the friction circle as well, ``sqpmethod`` would only
-confirm it and is not asked.
+none; where its solution keeps the nonlinear rows as well, it is the optimum of all of them, and no
+other solver is asked.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class CasadiBackend:
         if why:
             return self._infeasible(instance, why, closest)
         residuals = residuals_of(instance, separation, points)
-        if _answered(instance, points, residuals):
+        if _answered(instance, separation, points, residuals):
             word = "the optimum of the linear rows keeps the others too"
             found, cost = self._curve(instance, points), instance.objective(points)
             return SolveResult(SolveStatus.SOLVED, found, cost, detail=word, residuals=residuals)
@@ -327,16 +327,11 @@ class CasadiBackend:
         return model.with_unknowns(points, solution.x), status, word, solution.iterations
 
 
-def _answered(instance: Instance, points: Array, residuals: dict[str, float]) -> bool:
-    """Whether the optimum of the linear rows keeps the nonlinear ones too, and so is the NLP's.
-
-    Only where there are few enough of those to look at (s alone); IPOPT is left to find its own.
-    """
-    if points is not instance.relaxed or instance.model.structure.solver != "sqpmethod":
+def _answered(instance: Instance, separation: Separation, points: Array, residuals: dict[str, float]) -> bool:
+    """Whether the optimum of the linear rows keeps the nonlinear ones too, and so is the NLP's."""
+    if points is not instance.relaxed or largest_violation(residuals) > 0.0:
         return False
-    return (
-        not instance.problem.lateral and largest_violation(residuals) <= 0.0 and instance.keeps_circle(points)
-    )
+    return instance.keeps_curved(points, *instance.bounds(separation, points))
 
 
 def _cut(time_limit: float | None, why: OutOfTime | None = None) -> str:

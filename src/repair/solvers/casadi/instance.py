@@ -15,6 +15,7 @@ from repair.problem.lateral import kept_path
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.model import Model
+from repair.solvers.casadi.nlp import STANDSTILL
 from repair.solvers.casadi.rows import SAMPLED, Datum, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
 from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
@@ -24,6 +25,7 @@ __all__ = [
     "ROAD_SLACK",
     "Instance",
     "axis_curvature",
+    "body",
     "guide_of",
     "in_plane",
     "lay_out",
@@ -67,6 +69,26 @@ def in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
     l, (v, w), (a, b) = states[0, :, 1], states[1].T, states[2].T  # noqa: E741
     scale, square = 1.0 - kappa * l, v**2
     return scale * a - 2.0 * kappa * v * w - slope * l * square, b + scale * kappa * square
+
+
+def body(
+    kappa: Array, states: Array, along: Array, across: Array, overhang: float
+) -> tuple[Array, Array, Array]:
+    """Curvature of the driven path, and l of the body's front and back (K,), of states (3, K, 2).
+
+    Parameters
+    ----------
+    kappa, along, across : (K,) array
+        Curvature of the axis, and the accelerations of :func:`in_plane`.
+    overhang : float
+        Half the length of the body [m].
+    """
+    l, (v, w) = states[0, :, 1], states[1].T  # noqa: E741
+    forward = (1.0 - kappa * l) * v
+    square = forward**2 + w**2 + STANDSTILL
+    speed = np.sqrt(square)
+    middle, swing = l - 0.5 * overhang**2 * kappa, overhang * w / speed
+    return (forward * across - w * along) / (square * speed), middle + swing, middle - swing
 
 
 @lru_cache(maxsize=128)
@@ -251,12 +273,25 @@ class Instance:
         value = (points * (0.5 * (self.model.hessian @ points) - self.pulled)).sum()
         return float(value + 0.5 * (self.model.reference_weight @ self.wanted**2).sum())
 
-    def keeps_circle(self, points: Array) -> bool:
-        """Whether the rows that are nonlinear with s alone are kept, as tightly as the solver is asked to."""
-        most = self.limits[1]
-        along, across = plane_acceleration(self.problem, self._states(points).swapaxes(0, 1))
-        total, side = most[RowKind.CIRCLE] - _TIGHTEN, most[RowKind.ACROSS] - _TIGHTEN
-        return bool((along**2 + across**2).max() <= total and np.abs(across).max() <= side)
+    def keeps_curved(self, points: Array, low: Array, high: Array) -> bool:
+        """Whether the nonlinear rows are kept, as tightly as the solver is asked to.
+
+        Parameters
+        ----------
+        points : (n, 2) array
+            Control points less the origin, around which :meth:`bounds` made the bounds.
+        low, high : (R,) array
+            Of all rows.
+        """
+        states = self._states(points)
+        kappa, slope = axis_curvature(self.problem, states[0, :, 0])
+        along, across = in_plane(kappa, slope, states)
+        rows = [along**2 + across**2, across]
+        if self.problem.lateral:
+            bend, *ends = body(kappa, states, along, across, self.model.structure.overhang)
+            rows += [along, bend, *ends]
+        value, first = np.concatenate(rows), self.model.linear_count
+        return bool((low[first:] <= value).all() and (value <= high[first:]).all())
 
     def _states(self, points: Array) -> Array:
         """Positions, velocities, accelerations (3, S, 2) at the samples."""

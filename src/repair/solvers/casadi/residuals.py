@@ -9,9 +9,8 @@ import numpy as np
 from repair.arrays import Array
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
-from repair.solvers.casadi.instance import Instance, axis_curvature, in_plane, plane_acceleration
+from repair.solvers.casadi.instance import Instance, axis_curvature, body, in_plane, plane_acceleration
 from repair.solvers.casadi.model import TOLERANCE
-from repair.solvers.casadi.nlp import STANDSTILL
 from repair.solvers.casadi.rows import FAMILIES, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
 from repair.timegrid import INSTANT
@@ -66,16 +65,10 @@ def _plane_violations(instance: Instance, states: Array) -> dict[str, float]:
         found["longitudinal_acceleration"] = max(
             0.0, float(along.max()) - limits.a_max, limits.a_min - float(along.min())
         )
-        (s, l), (v, w) = states[0].T, states[1].T  # noqa: E741
-        forward = (1.0 - kappa * l) * v
-        square = forward**2 + w**2 + STANDSTILL
-        speed = np.sqrt(square)
-        bend = (forward * across - w * along) / (square * speed)
+        bend, *places = body(kappa, states, along, across, instance.model.structure.overhang)
         found["curvature"] = _excess(np.abs(bend).max() - limits.curvature)
-        reach = instance.model.structure.overhang
-        middle, swing = l - 0.5 * reach**2 * kappa, reach * w / speed
-        ends = np.concatenate((middle + swing, middle - swing))
-        right, left = instance.room_of_ends(s, 0.0, 0.0)
+        ends = np.concatenate(places)
+        right, left = instance.room_of_ends(states[0, :, 0], 0.0, 0.0)
         found["body_on_road"] = _excess((right - ends).max(), (ends - left).max())
     return found
 
