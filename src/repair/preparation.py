@@ -205,7 +205,7 @@ def laid_out(
     like : Checker, optional
         One for the same road, whose edge is taken over.
     within_reach : bool
-        Obstacles out of the ego's reach are left without boxes.
+        Obstacles out of the ego's reach until the repairs end are left without boxes.
     """
     vehicle = scene.vehicle
     s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
@@ -218,8 +218,12 @@ def laid_out(
         checker = Checker(scene, limits, sampled(config.checker, scene.dt), allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
-    within = partial(_part_in_reach, scene, config, limits, given, reference) if within_reach else None
-    whole = Boxes(partial(_boxes, scene, offsets, within))
+
+    def all_boxes(until: float = np.inf) -> Boxes:
+        part = partial(_part_in_reach, scene, config, limits, given, reference, until)
+        return Boxes(partial(_boxes, scene, offsets, part if within_reach else None))
+
+    whole = all_boxes()
     if not within_reach:
         with phases("occupancy"):
             whole.occupancy  # noqa: B018 - to be known by that name in the times
@@ -256,6 +260,10 @@ def laid_out(
     logging.getLogger(__name__).info("%s: conflict %s at %g s", scene.id, conflict.kind, conflict.time)
     t_end = min(wanted, t_reference)
     t_end = max(on_grid(t_end, scene.dt), min(scene.dt, t_reference))
+    if within_reach and not whole.known:
+        # Control points act a little after the end as well; what is later than that, nobody asks.
+        late = 0.5 * config.repair.degree * config.repair.spacing
+        boxes = Boxes(partial(_left_of, all_boxes(t_end + late), places, touching, offsets))
     return Prepared(
         scene=scene,
         settings=config.repair,
@@ -274,13 +282,14 @@ def laid_out(
 
 
 def _part_in_reach(
-    scene: Scene, config: Config, limits: Limits, given: GivenReference | None, followed: Curve | None
-) -> Within | None:
-    """The part of the road where the ego may be; None where nobody knows."""
+    scene: Scene, config: Config, limits: Limits, given: GivenReference | None, followed: Curve | None,
+    until: float,
+) -> Within | None:  # fmt: skip
+    """The part of the road where the ego may be until a time [s]; None where nobody knows."""
     places = None if given is None else given.positions
     if followed is not None:
         places = scene.frame.to_cartesian(*followed.sample(scene.times).position.T)
-    return None if places is None else part_in_reach(scene, config.repair, limits, places)
+    return None if places is None else part_in_reach(scene, config.repair, limits, places, until)
 
 
 def _boxes(

@@ -24,6 +24,7 @@ from repair.vehicle.transitions_fast import clearly_drivable
 from repair.world.collision import CollisionWorld
 from repair.world.road import RoadBoundary, grouping
 from repair.world.road_corridor import RoadCorridor
+from repair.world.tracks import INSTANT
 
 EGO = load_vehicle(1)
 
@@ -229,6 +230,38 @@ def test_looking_at_blocks_drops_no_contact(seed):
     here = x + 1j * y
     found = world.contact_along(here, heading, start)
     assert world.contact_along(here, heading, start, all_pairs=True) == found
+
+
+@settings(max_examples=120, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_margin_and_contact_are_looked_for_at_once(seed):
+    rng = np.random.default_rng(seed)
+    world = CollisionWorld(crowd(rng), EGO, 0.1, 20, int(rng.integers(1, 6)))
+    start = int(rng.integers(0, world.n_samples))
+    x, y, heading = driven(rng, int(rng.integers(1, world.n_samples - start + 1)))
+    here, margin = x + 1j * y, float(rng.choice([0.01, 0.4]))
+    step = float(np.abs(np.diff(here)).max(initial=0.0))
+    beside = world.met_at(start, complex(here[0]), float(heading[0]), margin) if rng.random() < 0.5 else ()
+    asked = {"margin": margin, "beside": frozenset(beside), "since": int(rng.integers(0, 5))}
+    near, contact = (world.contact_along(here, heading, start, **keys) for keys in (asked, {}))
+    assert world.met_along(here, heading, start, step, **asked) == (near, contact)
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_pairs_are_looked_at_in_the_order_of_time(seed):
+    rng = np.random.default_rng(seed)
+    late_crowd = [replace(one, late=int(rng.integers(-1, 2))) for one in crowd(rng)]
+    table = CollisionWorld(late_crowd, EGO, 0.1, 20, 2)._table
+    tracks, since, last = len(table.kind), int(rng.integers(0, 3)), 12
+    ego = rng.integers(since, last + 1, int(rng.integers(0, 30)) if tracks else 0)
+    track = rng.integers(0, max(tracks, 1), len(ego))
+    expected = set()
+    for k, m in zip(ego.tolist(), track.tolist(), strict=True):
+        expected.add((k, k, m))
+        if table.mode[m] != INSTANT:
+            expected |= {(max(k - 1, since), k, m), (k, min(k + 1, last), m)}
+    assert list(table.intervals(ego, (ego + 3) * tracks + track, since, last)) == sorted(expected)
 
 
 # --------------------------------------------------------------------- limits

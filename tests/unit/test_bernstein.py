@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
 from repair.arrays import frozen
 from repair.baselines.qptr.structure import qp_structure
-from repair.curves.base import Curve
+from repair.curves.base import Curve, is_curve
 from repair.curves.bernstein import BernsteinCurve, bernstein_basis, sampling_at
 from repair.curves.sampling import evaluated
 
@@ -27,6 +29,8 @@ def test_basis_is_a_partition_of_unity():
 def test_is_a_curve_over_its_span():
     curve = chain()
     assert isinstance(curve, Curve)
+    for thing in (curve, None, np.zeros(3), "curve", SimpleNamespace(t_start=0.0, t_end=1.0, sample=None)):
+        assert is_curve(thing) == isinstance(thing, Curve)
     assert (curve.t_start, curve.t_end, curve.degree) == (1.0, 3.0, 5)
 
 

@@ -62,6 +62,13 @@ def test_derivatives_against_finite_differences(frame: FrenetFrame) -> None:
     np.testing.assert_allclose(rate[~knot], frame.curvature_rate(s)[~knot], atol=1e-5)
 
 
+def test_a_bend_is_curvature_and_rate(frame: FrenetFrame) -> None:
+    s = np.linspace(-2.0, frame.length + 2.0, 77)
+    curvature, rate = frame.bend(s)
+    np.testing.assert_array_equal(curvature, frame.curvature(s))
+    np.testing.assert_array_equal(rate, frame.curvature_rate(s))
+
+
 def test_curvature_is_continuous(frame: FrenetFrame) -> None:
     s = np.concatenate([frame.s, [0.0, frame.length]])
     np.testing.assert_allclose(frame.curvature(s - 1e-9), frame.curvature(s + 1e-9), atol=1e-6)

@@ -7,7 +7,8 @@ import pytest
 from tests import roads
 
 import repair
-from repair.problem.lateral import aside_at, kept_path
+from repair.preparation import among
+from repair.problem.lateral import LastPath, aside_at, kept_path, path_of
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +56,31 @@ def test_a_reference_on_the_axis_changes_nothing(scene):
     points = np.column_stack([np.linspace(0.0, 20.0, 12), np.zeros(12)])
     assert aside_at(problem, points[:, 0]) is None
     assert kept_path(problem, points, 3, 0.4) is points
+
+
+def test_what_was_asked_last_is_not_the_answer_to_something_else(scene):
+    last = LastPath()
+    first, second = (
+        repair.repair(scene, reference=winding(scene), backend="qptr").prepared.reference for _ in "ab"
+    )
+    assert first is not second
+    for reference, since in ((first, 0.0), (first, 0.0), (first, 0.3), (second, 0.3), (first, 0.3)):
+        for known, fresh in zip(last(reference, since), path_of(reference, since), strict=True):
+            np.testing.assert_array_equal(known, fresh)
+
+
+def test_boxes_are_those_of_the_whole_as_long_as_somebody_asks(scene):
+    """A cycle makes those within reach until its repairs end; each problem is the same among all of them."""
+    watch = repair.Repairer(scene, backend="ego", overrides=["repair.after_conflict=1.0"])
+    walker = np.column_stack([np.linspace(25.0, 5.0, 41), np.full(41, 0.3), np.full(41, np.pi)])
+    walker[:, :2] += scene.initial_state.x, scene.initial_state.y
+    traffic = [wall(scene, 27.0), repair.Prediction(8, walker, 0.8, 0.6)]
+    prepared = watch.update(winding(scene), traffic=traffic).prepared
+    whole, made = among(prepared, prepared.scene.obstacles).occupancy, prepared.occupancy
+    asked = whole.t <= prepared.t_end + 0.2
+    assert asked.sum() < len(asked) - 5  # else nothing is left out
+    known = np.isfinite(made.lower).all(axis=-1)
+    np.testing.assert_array_equal(made.lower[known], whole.lower[known])
+    np.testing.assert_array_equal(made.upper[known], whole.upper[known])
+    assert known[:, asked][:, -1].all()
+    assert not known[:, -1].any()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from repair.backend.base import Closest, RepairBackend, SolveResult, SolveStatus
-from repair.curves.base import Curve, FrenetTrajectory
+from repair.curves.base import Curve, FrenetTrajectory, is_curve
 from repair.errors import BackendError, foreign, in_words, kind_of
 from repair.problem.problem import RepairProblem
 from repair.timegrid import STEP
@@ -71,9 +71,7 @@ def _wrong(answer: Any, problem: RepairProblem) -> str:
         isinstance(v, Real) for v in answer.residuals.values()
     ):
         return "residuals that are no mapping of numbers"
-    if not isinstance(answer.stages, Mapping) or not all(
-        isinstance(c, Curve) for c in answer.stages.values()
-    ):
+    if not isinstance(answer.stages, Mapping) or not all(map(is_curve, answer.stages.values())):
         return "stages that are no mapping of curves"
     if answer.curve is not None and (why := _wrong_curve(answer.curve, problem)):
         return why
@@ -89,7 +87,7 @@ def _wrong_closest(closest: Any, problem: RepairProblem) -> str:
 
 
 def _wrong_curve(curve: Any, problem: RepairProblem) -> str:
-    if not isinstance(curve, Curve):
+    if not is_curve(curve):
         return f"{kind_of(curve)} as its curve, which needs t_start, t_end and sample(t)"
     try:
         start, end = float(curve.t_start), float(curve.t_end)

@@ -286,12 +286,12 @@ class Checker:
         """
         margin = self.config.clearance
         since = max(round(t_from / self.scene.dt * self.config.substeps) - first, 0)
-        near = self.world.contact_along(
-            centre, orientation, first, step, margin=margin, beside=self._beside, since=since
-        )
-        # Who never enters a margin touches nothing, but for the margins that do not count.
-        unsure = near is not None or bool(self._beside) or since > 0
-        contact = self.world.contact_along(centre, orientation, first, step) if margin and unsure else near
+        if margin:
+            near, contact = self.world.met_along(
+                centre, orientation, first, step, margin=margin, beside=self._beside, since=since
+            )
+        else:
+            near = contact = self.world.contact_along(centre, orientation, first, step, since=since)
         return met(near, contact, margin), contact
 
     def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:

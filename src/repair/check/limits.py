@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array, largest, smallest
 from repair.check.verdict import Reason, Violation
@@ -41,6 +42,16 @@ __all__ = [
 ROUNDING = 1e-6
 _FINE = 1e-3  # [s]
 _STANDS = 0.1  # below this speed [m/s] a path has no direction along which to accelerate
+
+
+# What is held against a limit in the plane, and that limit, in words.
+_MEASURED = (
+    "brakes at {:.2f} m/s² of {:.2f}",
+    "accelerates at {:.2f} m/s² of {:.2f}",
+    "needs {:.2f} of what the engine gives at that speed, {:.2f}",
+    "lateral acceleration {:.2f} m/s² of {:.2f}",
+    "total acceleration {:.2f} m/s² of {:.2f}",
+)
 
 
 class Excess(NamedTuple):
@@ -135,19 +146,28 @@ def plane_accelerations(frame: FrenetFrame, samples: FrenetTrajectory) -> tuple[
     With c = 1 - kappa l the velocity in the axis' tangent and normal is (c s', l'), and the acceleration
     (c s'' - 2 kappa s' l' - kappa' l s'^2, l'' + c kappa s'^2).
     """
+    along, across, _ = _driven(frame, samples)
+    return along, across
+
+
+def _driven(frame: FrenetFrame, samples: FrenetTrajectory) -> tuple[Array, Array, Array]:
+    """:func:`plane_accelerations`, and the speed of the centre (K,) [m/s]."""
     (s, l), (v, w), (a, b) = samples.position.T, samples.velocity.T, samples.acceleration.T  # noqa: E741
-    kappa = frame.curvature(s)
     if not np.count_nonzero(l) and not np.count_nonzero(w):
-        return a, kappa * v * v
+        return a, frame.curvature(s) * v * v, np.abs(v)
+    kappa, rate = frame.bend(s)
     scale = 1.0 - kappa * l
     forward = scale * v
-    along = scale * a - 2.0 * kappa * v * w - frame.curvature_rate(s) * l * v * v
+    along = scale * a - 2.0 * kappa * v * w - rate * l * v * v
     across = b + forward * kappa * v
     speed = np.hypot(forward, w)
     moving = speed > _STANDS
-    cos = np.where(moving, forward / np.where(moving, speed, 1.0), 1.0)
-    sin = np.where(moving, w / np.where(moving, speed, 1.0), 0.0)
-    return cos * along + sin * across, cos * across - sin * along
+    if np.count_nonzero(moving) == len(moving):
+        cos, sin = forward / speed, w / speed
+    else:
+        pace = np.where(moving, speed, 1.0)
+        cos, sin = np.where(moving, forward / pace, 1.0), np.where(moving, w / pace, 0.0)
+    return cos * along + sin * across, cos * across - sin * along, speed
 
 
 def plane_excess(
@@ -167,19 +187,18 @@ def plane_excess(
     """
     if not len(samples):
         return []
-    rows = _against(samples, frame, limits, vehicle, tolerance)
+    values, most, adds = _against(samples, frame, limits, vehicle, tolerance)
     if len(samples) > 1:
-        kinks = _kinks(frame, samples)
-        open_ = [_may_exceed(value, most, kinks * per) for value, most, _, per in rows]
-        fine = _fine(samples.t, np.logical_or.reduce(open_))
-        if not len(fine):
+        open_ = np.logical_or.reduce(_may_exceed(values, most, _kinks(frame, samples) * adds), axis=0)
+        if not np.count_nonzero(open_):
             return []
-        samples = curve.sample(fine)
-        rows = _against(samples, frame, limits, vehicle, tolerance)
+        samples = curve.sample(_fine(samples.t, open_))
+        values, most, _ = _against(samples, frame, limits, vehicle, tolerance)
+    highest, allowed = np.maximum.reduce(values, axis=1).tolist(), most[:, 0].tolist()
     return [
-        Excess(float(samples.t[np.argmax(value > most + ROUNDING)]), text.format(float(value.max()), most))
-        for value, most, text, _ in rows
-        if not float(value.max()) <= most + ROUNDING
+        Excess(float(samples.t[np.argmax(value > most + ROUNDING)]), text.format(highest, most))
+        for value, highest, most, text in zip(values, highest, allowed, _MEASURED, strict=True)
+        if not highest <= most + ROUNDING
     ]
 
 
@@ -237,19 +256,23 @@ def _kinks(frame: FrenetFrame, samples: FrenetTrajectory) -> Array:
     return np.asarray(np.abs(passed[1:] - passed[:-1]) * np.maximum(reach[1:], reach[:-1]))
 
 
-def _may_exceed(value: Array, most: float, kinks: Array) -> Array:
-    """Between which samples (K - 1,) a value may exceed: it swings by no more than around that interval.
+def _may_exceed(values: Array, most: Array, kinks: Array) -> npt.NDArray[np.bool_]:
+    """Between which samples (M, K - 1) values may exceed: they swing by no more than around that interval.
 
     Parameters
     ----------
-    kinks : (K - 1,) array
-        By how much it may jump in between.
+    values : (M, K) array
+    most : (M, 1) array
+        What they may be.
+    kinks : (M, K - 1) array
+        By how much they may jump in between.
     """
-    swing = np.abs(value[1:] - value[:-1])
+    swing = np.abs(values[:, 1:] - values[:, :-1])
     around = swing + kinks
-    np.maximum(around[1:], swing[:-1], out=around[1:])
-    np.maximum(around[:-1], swing[1:], out=around[:-1])
-    return np.asarray(~(np.maximum(value[1:], value[:-1]) + around <= most))
+    np.maximum(around[:, 1:], swing[:, :-1], out=around[:, 1:])
+    np.maximum(around[:, :-1], swing[:, 1:], out=around[:, :-1])
+    around += np.maximum(values[:, 1:], values[:, :-1])
+    return np.asarray(~(around <= most))
 
 
 def _fine(times: Array, chosen: Array) -> Array:
@@ -261,24 +284,20 @@ def _fine(times: Array, chosen: Array) -> Array:
 
 def _against(
     samples: FrenetTrajectory, frame: FrenetFrame, limits: Limits, vehicle: Vehicle, tolerance: float
-) -> tuple[tuple[Array, float, str, float], ...]:
-    """What is measured at samples (K,), what it may be at most, the words for it, and what 1 m/s² adds."""
-    along, across = plane_accelerations(frame, samples)
-    (s, l), (v, w) = samples.position.T, samples.velocity.T  # noqa: E741
-    engine = vehicle.engine_acceleration(np.hypot((1.0 - frame.curvature(s) * l) * v, w))
+) -> tuple[Array, Array, Array]:
+    """What :data:`_MEASURED` names at samples (5, K), what it may be at most (5, 1), and what 1 m/s² adds."""
+    along, across, speed = _driven(frame, samples)
+    engine = vehicle.engine_acceleration(speed)
     more, c = 1.0 + tolerance, limits
-    return (
-        (-along, -c.a_min * more, "brakes at {:.2f} m/s² of {:.2f}", 1.0),
-        (along, c.a_max * more, "accelerates at {:.2f} m/s² of {:.2f}", 1.0),
-        (
-            along / engine,
-            1.0 if math.isfinite(c.a_max) else math.inf,
-            "needs {:.2f} of what the engine gives at that speed, {:.2f}",
-            1.0 / float(engine.min()),
-        ),
-        (np.abs(across), c.a_lat * more, "lateral acceleration {:.2f} m/s² of {:.2f}", 1.0),
-        (np.hypot(along, across), c.a_total * more, "total acceleration {:.2f} m/s² of {:.2f}", 1.0),
-    )
+    values = np.empty((5, len(along)))
+    values[0], values[1] = -along, along
+    values[2] = along / engine
+    values[3] = np.abs(across)
+    np.hypot(along, across, out=values[4])
+    powered = 1.0 if math.isfinite(c.a_max) else math.inf
+    most = np.array((-c.a_min * more, c.a_max * more, powered, c.a_lat * more, c.a_total * more))
+    adds = np.array((1.0, 1.0, 1.0 / smallest(engine), 1.0, 1.0))
+    return values, most[:, None], adds[:, None]
 
 
 def as_violation(broken: list[Excess]) -> list[Violation]:

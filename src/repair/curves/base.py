@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.timegrid import INSTANT
 
-__all__ = ["Curve", "FrenetTrajectory", "Hulled", "SplicedCurve", "joined"]
+__all__ = ["Curve", "FrenetTrajectory", "Hulled", "SplicedCurve", "is_curve", "joined"]
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,13 @@ class Curve(Protocol):
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate at the times ``t`` (K,); outside the span the curve is extended from its end state."""
         ...
+
+
+def is_curve(thing: Any) -> TypeGuard[Curve]:
+    """The same as ``isinstance(thing, Curve)``, without the time that a protocol takes to be asked."""
+    return (
+        hasattr(thing, "t_start") and hasattr(thing, "t_end") and getattr(thing, "sample", None) is not None
+    )
 
 
 @runtime_checkable

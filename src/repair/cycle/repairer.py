@@ -20,7 +20,7 @@ from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.config.load import load_config
 from repair.config.schema import Config
-from repair.curves.base import Curve, SplicedCurve
+from repair.curves.base import Curve, SplicedCurve, is_curve
 from repair.cycle.asked import Asked, Others, require_deadline, since, spare, step_of
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
@@ -210,7 +210,7 @@ class Repairer:
             raise ReferenceTrajectoryError(
                 "a plan is needed, and None is none; a cycle that had no time has none either"
             )
-        if isinstance(reference, Curve):
+        if is_curve(reference):
             raise ReferenceTrajectoryError("a Repairer takes places on the plane, and not a curve in a frame")
         at = None if deadline is None else begin + deadline - spare(deadline)
         asked = Asked(now, step_of(now, self.scene.dt), begin, at, Paced(paces=self._paces))

@@ -41,14 +41,19 @@ def room_of(scene: Scene, settings: RepairConfig) -> LateralBounds:
     return wide.get(settings.lateral, scene.lane)
 
 
-def part_in_reach(scene: Scene, settings: RepairConfig, limits: Limits, positions: Array) -> Within:
+def part_in_reach(
+    scene: Scene, settings: RepairConfig, limits: Limits, positions: Array, until: float = np.inf
+) -> Within:
     """The part of the road where the ego may be until its reference ends.
 
     Parameters
     ----------
     positions : (K, 2) array
         The reference at the scenario's steps [m].
+    until : float
+        Later than this nobody asks where it is [s].
     """
+    positions = positions[: int(min(until / scene.dt + 2.0, len(positions)))]
     (s, aside), (speed, _) = scene.start[:2].tolist()
     end = scene.frame.to_frenet(positions[-1:])[0, 0]
     # Until the end of each step; the last of them ends where the reference does.

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from repair.arrays import Array
-from repair.curves.base import FrenetTrajectory
+from repair.curves.base import Curve, FrenetTrajectory
 from repair.problem.limits import Limits
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.problem.surroundings import Surroundings
 from repair.scene.road.bounds import LateralBounds
 
-__all__ = ["LateralProfile", "aside_at", "kept_path", "lateral_profiles", "quintics"]
+__all__ = [
+    "LastPath",
+    "LateralProfile",
+    "Path",
+    "aside_at",
+    "kept_path",
+    "lateral_profiles",
+    "path_of",
+    "quintics",
+]
 
 _FINE = 0.02  # between the places of the reference that a kept path goes through [s]
 
@@ -141,7 +151,48 @@ def lateral_profiles(
     ]
 
 
-def aside_at(problem: RepairProblem, s: Array, before: float = 0.0) -> Array | None:
+class Path(NamedTuple):
+    """The path of a reference: where it is aside of the frame's axis.
+
+    Attributes
+    ----------
+    s, l : (K,) array
+        Places along the axis, ascending, and how far aside it is there [m].
+    """
+
+    s: Array
+    l: Array  # noqa: E741
+
+
+def path_of(reference: Curve, since: float) -> Path | None:
+    """The path of a reference from a time [s] on; None where it is the axis itself."""
+    count = max(int((reference.t_end - since) / _FINE), 2)
+    path = reference.sample(since + _FINE * np.arange(count + 1)).position
+    if not np.count_nonzero(path[:, 1]):
+        return None
+    return Path(np.maximum.accumulate(path[:, 0]), path[:, 1])
+
+
+class LastPath:
+    """:func:`path_of`, which keeps its last answer: a search asks for the same one again and again."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Curve, float, Path | None] | None = None
+
+    def __call__(self, reference: Curve, since: float) -> Path | None:
+        """As :func:`path_of`."""
+        known = self._known  # read once: another thread may put its own there
+        if known is None or known[0] is not reference or known[1] != since:
+            known = self._known = reference, since, path_of(reference, since)
+        return known[2]
+
+
+def aside_at(
+    problem: RepairProblem,
+    s: Array,
+    before: float = 0.0,
+    path_of: Callable[[Curve, float], Path | None] = path_of,
+) -> Array | None:
     """Where the reference's path is aside of the frame's axis at ``s`` (K,) [m]; None where it never is.
 
     Who keeps the path and drives it more slowly is aside by what the reference is at that place, not at that
@@ -151,16 +202,20 @@ def aside_at(problem: RepairProblem, s: Array, before: float = 0.0) -> Array | N
     ----------
     before : float
         From so long before t_rep on the reference is looked at [s].
+    path_of : callable
+        :func:`path_of`, or a :class:`LastPath`.
     """
-    since = problem.t_rep - before
-    count = max(int((problem.reference.t_end - since) / _FINE), 2)
-    path = problem.reference.sample(since + _FINE * np.arange(count + 1)).position
-    if not np.count_nonzero(path[:, 1]):
-        return None
-    return np.asarray(np.interp(s, np.maximum.accumulate(path[:, 0]), path[:, 1]))
+    path = path_of(problem.reference, problem.t_rep - before)
+    return None if path is None else np.asarray(np.interp(s, path.s, path.l))
 
 
-def kept_path(problem: RepairProblem, points: Array, degree: int, spacing: float) -> Array:
+def kept_path(
+    problem: RepairProblem,
+    points: Array,
+    degree: int,
+    spacing: float,
+    path_of: Callable[[Curve, float], Path | None] = path_of,
+) -> Array:
     """The control points of a uniform B-spline with l where the reference's path is, see :func:`aside_at`.
 
     Those of l are a quasi-interpolant of l(s(t)) (de Boor, *A Practical Guide to Splines*, ch. XII), which is
@@ -174,14 +229,19 @@ def kept_path(problem: RepairProblem, points: Array, degree: int, spacing: float
     degree : int
     spacing : float
         Of the knots [s].
+    path_of : callable
+        As in :func:`aside_at`.
     """
     share = (degree + 1) / 24.0
     s = points[:, 0].copy()
-    s[1:-1] += share * np.diff(points[:, 0], n=2)  # where the curve is when each point acts
-    aside = aside_at(problem, s, degree * spacing)
+    step = s[1:] - s[:-1]
+    s[1:-1] += share * (step[1:] - step[:-1])  # where the curve is when each point acts
+    aside = aside_at(problem, s, degree * spacing, path_of)
     if aside is None:
         return points
-    bend = np.diff(aside, n=2, append=2.0 * aside[-1] - aside[-2])
+    rise = np.empty(len(aside))
+    rise[:-1] = aside[1:] - aside[:-1]
+    rise[-1] = (2.0 * aside[-1] - aside[-2]) - aside[-1]  # it goes on as it ends
     found = points.copy()
-    found[degree:, 1] = aside[degree:] - share * bend[degree - 1 :]
+    found[degree:, 1] = aside[degree:] - share * (rise[degree:] - rise[degree - 1 : -1])
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -174,6 +175,13 @@ def _smooth(
     return best, off
 
 
+@lru_cache(maxsize=16)
+def _observed(count: int, dt: float, n: int, spacing: float) -> Array:
+    """Map (count + n - 3, n) from control points to positions at the steps, and to a whisper of smoothing."""
+    basis = basis_matrix(np.arange(count) * dt, n, _DEGREE, spacing)
+    return frozen(np.vstack([basis, 1e-3 * np.diff(np.eye(n), n=3, axis=0)]))
+
+
 def _fitted(coordinates: Array, state: Array, dt: float, spacing: float) -> tuple[UniformBSpline, float]:
     """Least-squares spline with the derivatives ``state`` at its start, and by how much it misses [m]."""
     duration = (len(coordinates) - 1) * dt
@@ -181,10 +189,9 @@ def _fitted(coordinates: Array, state: Array, dt: float, spacing: float) -> tupl
     spacing = duration / (n - _DEGREE)
     if spacing * (n - _DEGREE) > duration:  # by a rounding error
         spacing = float(np.nextafter(spacing, 0.0))
-    basis = basis_matrix(np.arange(len(coordinates)) * dt, n, _DEGREE, spacing)
-    ridge = 1e-3 * np.diff(np.eye(n), n=3, axis=0)
-    left = np.vstack([basis, ridge])
-    right = np.vstack([coordinates, np.zeros((len(ridge), 2))])
+    left = _observed(len(coordinates), dt, n, spacing)
+    basis = left[: len(coordinates)]
+    right = np.vstack([coordinates, np.zeros((len(left) - len(coordinates), 2))])
     if len(state) < _DEGREE:
         # What is not given is found: the start is linear in it.
         heads = splice_points(np.eye(_DEGREE), _DEGREE, spacing)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from repair.arrays import Array, column
-from repair.curves.base import Curve
+from repair.curves.base import Curve, is_curve
 from repair.curves.codec import curve_to_dict, read_curve
 from repair.errors import ReferenceTrajectoryError, foreign
 from repair.reference.base import Track
@@ -115,7 +115,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
     """
     if isinstance(thing, Mapping) and set(thing) == {"curve"}:
         thing = read_curve(thing["curve"])
-    if isinstance(thing, Curve):
+    if is_curve(thing):
         return _of_curve(thing, scene)
     if hasattr(thing, "state_list"):
         made = _states_of(thing, scene.initial_time_step, scene)
@@ -129,11 +129,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
     _require_one_drive(fine, table[:, 0], scene.vehicle)
     made = _recording(at_steps(table, scene.dt), scene)
     _require_start(made, scene)
-    plain = {
-        key: column(values, 12)
-        for key, values in zip(KEYS, table.T, strict=True)
-        if np.isfinite(values).all()
-    }
+    plain = {k: v.tolist() for k, v in zip(KEYS, table.T, strict=True) if np.isfinite(v).all()}
     return GivenReference(made, None, plain)
 
 

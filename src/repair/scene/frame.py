@@ -159,10 +159,15 @@ class FrenetFrame:
 
     def curvature_rate(self, s: npt.ArrayLike) -> Array:
         """Derivative of the curvature by s [1/m²] (piecewise continuous)."""
+        return self.bend(s)[1]
+
+    def bend(self, s: npt.ArrayLike) -> tuple[Array, Array]:
+        """:meth:`curvature` and :meth:`curvature_rate` at ``s``, with one look at the spline."""
         _, (x1, y1), (x2, y2), (x3, y3) = self._derivatives(s, 3)
         square = x1 * x1 + y1 * y1
+        cubed = square * np.sqrt(square)
         cross, rate, dot = x1 * y2 - y1 * x2, x1 * y3 - y1 * x3, x1 * x2 + y1 * y2
-        return np.asarray((rate - 3.0 * cross * dot / square) / (square * np.sqrt(square)))
+        return np.asarray(cross / cubed), np.asarray((rate - 3.0 * cross * dot / square) / cubed)
 
     def to_cartesian(self, s: npt.ArrayLike, l: npt.ArrayLike) -> Array:  # noqa: E741
         """Points (..., 2) at arc length ``s`` and offset ``l``."""

@@ -127,6 +127,11 @@ class Boxes:
         return self._make()
 
     @property
+    def known(self) -> bool:
+        """Whether they have been made."""
+        return "_made" in self.__dict__
+
+    @property
     def occupancy(self) -> Occupancy:
         """The obstacles, inflated."""
         return self._made[0]

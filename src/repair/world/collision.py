@@ -13,6 +13,7 @@ counts an occupancy that is stated for an interval of steps at one of them; here
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -61,6 +62,9 @@ class _Asked(NamedTuple):
     beside: frozenset[int]
     since: int
     all_pairs: bool
+
+
+_EVERYTHING = _Asked(0j, frozenset(), 0, False)
 
 
 class CollisionWorld:
@@ -160,41 +164,103 @@ class CollisionWorld:
         """
         asked = _Asked(margin * (1 + 1j), beside, since, all_pairs)
         found = self._first(here, orientation, start, step, asked)
-        if found is None:
-            return None
+        return None if found is None else self._told(found, here, orientation)
+
+    def met_along(
+        self,
+        here: Points,
+        orientation: Array,
+        start: int,
+        step: float,
+        *,
+        margin: float,
+        beside: frozenset[int] = frozenset(),
+        since: int = 0,
+    ) -> tuple[Contact | None, Contact | None]:
+        """First contact of the ego enlarged by a margin, and that of the ego itself.
+
+        Parameters
+        ----------
+        here, orientation, start, step, margin, beside, since
+            As in :meth:`contact_along`. ``beside`` and ``since`` are for the enlarged ego alone.
+
+        Returns
+        -------
+        near, contact : Contact or None
+            What :meth:`contact_along` says of either; who is far from the one is so from the other.
+        """
+        self._require(here, orientation, start)
+        asked = _Asked(margin * (1 + 1j), beside, since, False)
+        ego, row = self._table.near(here, start, step, asked.margin)
+        if not len(ego):
+            return None, None
+        spare, reach = ego_room(here, orientation, self._radius)
+        ego, row = self._open(here, orientation, reach, ego, row, asked.margin)
+        near_ego, near_row = self._counted(here, orientation, start, ego, row, asked)
+        near = self._closely(here, orientation, start, spare, near_ego, near_row, asked)
+        contact = None
+        if near is not None or beside or since:  # else who never enters the margin touches nothing
+            ego, row = self._open(here, orientation, reach, ego, row, _EVERYTHING.margin)
+            contact = self._closely(here, orientation, start, spare, ego, row, _EVERYTHING)
+        return (
+            None if near is None else self._told(near, here, orientation),
+            None if contact is None else self._told(contact, here, orientation),
+        )
+
+    def _told(self, found: _Hit, here: Points, orientation: Array) -> Contact:
+        """A contact with what is to be said of it."""
         k = found.sample
-        axis = np.array([np.cos(orientation[k]), np.sin(orientation[k])])
+        axis = cmath.rect(1.0, orientation.item(k))
         centre, velocity = self._motion(found.obstacle, found.time)
-        ego = np.zeros(2)
+        ego = 0j
         if len(here) > 1:
             i = max(k - 1, 0)
-            moved = here[i + 1] - here[i]
-            ego = np.array([moved.real, moved.imag]) * self.substeps / self.dt
-        offset = centre - (here[k].real, here[k].imag)
-        behind = offset @ axis < -0.5 * self._sides[0] and (velocity - ego) @ axis > 0.0
-        vx, vy = np.nan_to_num(velocity).tolist()
-        return Contact(found.time, self._obstacles[found.obstacle].id, bool(behind), (vx, vy))
+            ego = (here.item(i + 1) - here.item(i)) * self.substeps / self.dt
+        offset = ((centre - here.item(k)) * axis.conjugate()).real
+        closing = ((velocity - ego) * axis.conjugate()).real
+        behind = offset < -0.5 * self._half.real and closing > 0.0
+        vx, vy = (0.0 if math.isnan(v) else v for v in (velocity.real, velocity.imag))
+        return Contact(found.time, self._obstacles[found.obstacle].id, behind, (vx, vy))
 
-    def _motion(self, index: int, time: float) -> tuple[Array, Array]:
+    def _motion(self, index: int, time: float) -> tuple[complex, complex]:
         """Centre and velocity of an obstacle at a time."""
         states = self._obstacles[index].states
         place = min(time / self.dt, len(states) - 1)
         low = int(place + 1e-9)
-        high = min(low + 1, len(states) - 1)
+        first = max(min(low, len(states) - 2), 0)
         weight = place - low
-        centre = (
-            states[low, :2] if weight < 1e-9 else (1 - weight) * states[low, :2] + weight * states[high, :2]
-        )
-        first = min(low, len(states) - 2) if len(states) > 1 else 0
-        velocity = np.zeros(2) if len(states) < 2 else (states[first + 1, :2] - states[first, :2]) / self.dt
-        if not np.isfinite(velocity).all():
-            heading, speed = states[low, 2:4]
-            velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+        centre = complex(*states[low, :2].tolist())
+        if not weight < 1e-9:
+            centre = (1 - weight) * centre + weight * complex(*states[low + 1, :2].tolist())
+        if len(states) < 2:
+            return centre, 0j
+        here, there = (complex(*states[k, :2].tolist()) for k in (first, first + 1))
+        velocity = (there - here) / self.dt
+        if not cmath.isfinite(velocity):
+            heading, speed = states[low, 2:4].tolist()
+            velocity = speed * complex(math.cos(heading), math.sin(heading))
         return centre, velocity
 
     def _first(
         self, here: Points, orientation: Array, start: int, step: float | None, asked: _Asked
     ) -> _Hit | None:
+        self._require(here, orientation, start)
+        if step is None:
+            step = float(np.abs(here[1:] - here[:-1]).max(initial=0.0))
+        if asked.all_pairs:
+            ego, row = self._table.everything(len(here), start)
+        else:
+            ego, row = self._table.near(here, start, step, asked.margin)
+        ego, row = self._counted(here, orientation, start, ego, row, asked)
+        if not len(ego):
+            return None
+        spare, reach = ego_room(here, orientation, self._radius)
+        if not asked.all_pairs:
+            ego, row = self._open(here, orientation, reach, ego, row, asked.margin)
+        return self._closely(here, orientation, start, spare, ego, row, asked)
+
+    def _require(self, here: Points, orientation: Array, start: int) -> None:
+        """Poses within the scenario, and finite ones."""
         stop = start + len(here)
         if start < 0 or stop > self.n_samples:
             raise ValueError(f"samples {start} to {stop} of a world of {self.n_samples}")
@@ -204,24 +270,22 @@ class CollisionWorld:
             np.isfinite(here).all() and np.isfinite(orientation).all()
         ):
             raise ValueError("the ego's poses are not finite")
-        if step is None:
-            step = float(np.abs(here[1:] - here[:-1]).max(initial=0.0))
-        if asked.all_pairs:
-            ego, row = self._table.everything(len(here), start)
-        else:
-            ego, row = self._table.near(here, start, step, asked.margin)
-        if asked.since or asked.beside:
-            counted = ego >= self._counting(here, orientation, start, asked)[row % len(self._table.kind)]
-            ego, row = ego[counted], row[counted]
-        if not len(ego):
-            return None
-        spare, reach = ego_room(here, orientation, self._radius)
-        if not asked.all_pairs:
-            chosen = self._unsettled(here, orientation, reach, ego, row, asked.margin)
-            if not np.count_nonzero(chosen):
-                return None
-            ego, row = ego[chosen], row[chosen]
-        return self._closely(here, orientation, start, spare, ego, row, asked)
+
+    def _counted(
+        self, here: Points, orientation: Array, start: int, ego: Index, row: Index, asked: _Asked
+    ) -> tuple[Index, Index]:
+        """The pairs that count."""
+        if not (asked.since or asked.beside):
+            return ego, row
+        counted = ego >= self._counting(here, orientation, start, asked)[row % len(self._table.kind)]
+        return ego[counted], row[counted]
+
+    def _open(
+        self, here: Points, orientation: Array, reach: Array, ego: Index, row: Index, margin: complex
+    ) -> tuple[Index, Index]:
+        """The pairs that :meth:`_unsettled` leaves open."""
+        chosen = self._unsettled(here, orientation, reach, ego, row, margin)
+        return ego[chosen], row[chosen]
 
     def _counting(self, here: Points, orientation: Array, start: int, asked: _Asked) -> Index:
         """Sample from which on each track counts: when the ego has been clear of those that it is beside."""

@@ -8,7 +8,7 @@ the ego may be treated as a point.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Within", "build_occupancy", "first_entry", "near", "relevant"]
 
+# Corners (T, 2) of a box, and where the outline is whole.
+_Box = tuple[Array, Array, npt.NDArray[np.bool_]]
+
 _STANDING = ("static", "environment")
+_NO_BOX: _Box = np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.bool_)
 _STRIDE = 2.0  # of the places of a path that obstacles are held against [m]
 
 
@@ -93,9 +97,8 @@ def build_occupancy(
     notes: list[str] = []
     inflate = np.array([s_offset, l_offset])
     seen = [np.zeros(len(one.steps), dtype=np.bool_) for one in looked]
-    for turn, projected in enumerate(_project_all(looked, frame)):
-        for j, (one, points) in enumerate(zip(looked, projected, strict=True)):
-            low, high, whole = _box(points, inflate)
+    for turn, boxes in enumerate(_boxes(looked, frame, inflate)):
+        for j, (one, (low, high, whole)) in enumerate(zip(looked, boxes, strict=True)):
             seen[j] |= whole
             if turn == 0:
                 lower[one.row, one.steps], upper[one.row, one.steps] = low, high
@@ -185,17 +188,27 @@ def _box(points: Array, inflate: Array) -> tuple[Array, Array, npt.NDArray[np.bo
     return lower, upper, whole
 
 
-def _project_all(looked: Sequence[_Looked], frame: FrenetFrame) -> list[list[Array]]:
-    """Frenet coordinates of all outlines, for each pass of the frame in one call."""
-    if not looked:
-        return []
-    shapes = [one.outline.shape for one in looked]
-    stacked = np.concatenate([one.outline.reshape(-1, 2) for one in looked])
-    sizes = np.cumsum([s[0] * s[1] for s in shapes])[:-1]
-    return [
-        [part.reshape(shape) for part, shape in zip(np.split(found, sizes), shapes, strict=True)]
-        for found in every_pass(frame, stacked)
-    ]
+def _boxes(looked: Sequence[_Looked], frame: FrenetFrame, inflate: Array) -> Iterator[list[_Box]]:
+    """:func:`_box` of each, for each pass of the frame; outlines of as many points all at once."""
+    alike: dict[int, list[int]] = {}
+    for j, one in enumerate(looked):
+        alike.setdefault(one.outline.shape[1], []).append(j)
+    order = [j for rows in alike.values() for j in rows]
+    if not order:
+        return
+    stacked = np.concatenate([looked[j].outline.reshape(-1, 2) for j in order])
+    for found in every_pass(frame, stacked):
+        made, begin = [_NO_BOX] * len(looked), 0
+        for width, rows in alike.items():
+            steps = [len(looked[j].steps) for j in rows]
+            end = begin + width * sum(steps)
+            lower, upper, whole = _box(found[begin:end].reshape(-1, width, 2), inflate)
+            begin, row = end, 0
+            for j, count in zip(rows, steps, strict=True):
+                part = slice(row, row + count)
+                made[j] = lower[part], upper[part], whole[part]
+                row += count
+        yield made
 
 
 def first_entry(occupancy: Occupancy, trajectory: FrenetTrajectory) -> tuple[int, int] | None:

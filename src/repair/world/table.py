@@ -6,7 +6,7 @@ Each sample stands for the time half way to its neighbours. Columns are tracks: 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,7 @@ __all__ = ["TrackTable"]
 
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
+_NOBODY: frozenset[int] = frozenset()
 
 
 class TrackTable:
@@ -86,6 +87,7 @@ class TrackTable:
         stacked = np.stack([t.rows for t in tracks], axis=1) if tracks else np.empty((self.n_samples, 0, 5))
         self.kind = np.array([t.kind for t in tracks], dtype=np.intp)
         self.mode = np.array([t.mode for t in tracks], dtype=np.intp)
+        self._instant = [t.mode == INSTANT for t in tracks]
         x, y, heading, *size = np.moveaxis(stacked, 2, 0)
         # Points and directions of the plane as complex numbers: one call where coordinates take two.
         centre = as_complex(x, y)
@@ -139,7 +141,7 @@ class TrackTable:
         ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
         return ego, (ego + start) * len(self.kind) + track
 
-    def intervals(self, ego: Index, row: Index, since: int, last: int) -> list[tuple[int, int, int]]:
+    def intervals(self, ego: Index, row: Index, since: int, last: int) -> Iterator[tuple[int, int, int]]:
         """Pairs of a sample and a shape as the two intervals beside it, and as the instant that it is.
 
         Parameters
@@ -148,18 +150,19 @@ class TrackTable:
         since, last : int
             The first of the ego's samples that counts, and the last one.
 
-        Returns
-        -------
-        list of (first, after, track)
+        Yields
+        ------
+        (first, after, track)
             The interval's samples, the same one twice for an instant; each once, in the order of time.
         """
-        found: set[tuple[int, int, int]] = set()
+        at: dict[int, set[int]] = {}
         for k, m in zip(ego.tolist(), (row % len(self.kind)).tolist(), strict=True):
-            found.add((k, k, m))
-            if self.mode[m] != INSTANT:
-                found.add((max(k - 1, since), k, m))
-                found.add((k, min(k + 1, last), m))
-        return sorted(found)
+            at.setdefault(k, set()).add(m)
+        for first in sorted({j for k in at for j in (k - 1, k)}):
+            here, following = at.get(first, _NOBODY), at.get(first + 1, _NOBODY)
+            yield from ((first, first, m) for m in sorted(here))
+            if since <= first < last:
+                yield from ((first, first + 1, m) for m in sorted(here | following) if not self._instant[m])
 
     def motion(
         self, first: int, after: int, track: int, start: int, unit: float, here: Points, orientation: Array,
@@ -185,8 +188,8 @@ class TrackTable:
             begin, (after + start) * unit - begin,
             place, self.shapes.item(0, row_end) - here.item(after) - place,
             size, self.size.item(row_end) - size,
-            angle, wrap(orientation.item(after) - angle).item(),
-            heading, wrap(heading_end - heading).item(),
+            angle, _wrapped(orientation.item(after) - angle),
+            heading, _wrapped(heading_end - heading),
             reach, spare.item(first) if after > first else 0.0,
         ), left  # fmt: skip
 
@@ -195,3 +198,8 @@ class TrackTable:
         if (track, step) not in self._lefts:
             self._lefts[track, step] = polygons_left(self.tracks[track].polygons[step])
         return self._lefts[track, step]
+
+
+def _wrapped(angle: float) -> float:
+    """As :func:`repair.arrays.wrap`, of one number."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi

@@ -13,14 +13,14 @@ import time
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array
 from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
 from repair.curves.bases import fitted_knots
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime
-from repair.problem.lateral import kept_path
+from repair.problem.lateral import LastPath, kept_path
 from repair.problem.problem import RepairProblem
 from repair.solvers.ego.cost_structure import SIZES, Sizes
 from repair.solvers.ego.minimise import Minimiser, Minimum
@@ -75,6 +75,7 @@ class EgoBackend:
         self.degree = degree
         self.spacing = spacing
         self.stages = Stages(self.config, degree, minimise, sizes)
+        self._path_of = LastPath()
 
     def solve(
         self,
@@ -108,10 +109,10 @@ class EgoBackend:
                 SolveStatus.TIME_LIMIT, build_time=built - begin, solve_time=now - built,
                 detail=f"time limit of {time_limit:g} s",
             )  # fmt: skip
-        curves = {
-            name: UniformBSpline(problem.t_rep, spacing, self.degree, self._driven(problem, minimum, spacing))
-            for name, minimum in (("deformation", deformed), ("refinement", refined))
-        }
+        curves = {"deformation": self._driven(problem, deformed, spacing)}
+        curves["refinement"] = (
+            curves["deformation"] if refined is deformed else self._driven(problem, refined, spacing)
+        )
         converged = deformed.converged and refined.converged
         return SolveResult(
             status=SolveStatus.SOLVED if converged else SolveStatus.ITERATION_LIMIT,
@@ -125,9 +126,12 @@ class EgoBackend:
             stages=curves,
         )
 
-    def _driven(self, problem: RepairProblem, minimum: Minimum, spacing: float) -> Array:
+    def _driven(self, problem: RepairProblem, minimum: Minimum, spacing: float) -> UniformBSpline:
         points = _standing(minimum.points, self.degree)
-        return points if problem.lateral else frozen(kept_path(problem, points, self.degree, spacing))
+        if not problem.lateral:
+            points = kept_path(problem, points, self.degree, spacing, self._path_of)
+            points.setflags(write=False)
+        return UniformBSpline(problem.t_rep, spacing, self.degree, points)
 
 
 def make(config: Configuration) -> EgoBackend:

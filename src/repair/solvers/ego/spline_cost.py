@@ -18,7 +18,7 @@ from repair.arrays import Array
 from repair.solvers.ego.cost_structure import SIZES, Sizes, cost_structure
 from repair.solvers.ego.penalties import SoftBounds
 
-__all__ = ["Point", "SplineCost"]
+__all__ = ["Point", "SplineCost", "resting_cost"]
 
 _NONE, _NOTHING = np.empty(0, dtype=np.intp), np.empty(0)
 
@@ -29,6 +29,24 @@ class Point(NamedTuple):
     value: float
     gradient: Array
     curvature: Array
+
+
+def resting_cost(
+    points: Array, spacing: float, smooth: float, bounds: SoftBounds, sizes: Sizes = SIZES
+) -> float:
+    """The value of a :class:`SplineCost` without pairs at u = 0, where all of its points are free.
+
+    Parameters
+    ----------
+    points : (n, axes) array
+    spacing, smooth, bounds, sizes
+        As there.
+    """
+    n, axes = points.shape
+    made = cost_structure(n, axes, 0, n, spacing, smooth, 3 * axes, sizes)
+    x = (made.stack @ points).ravel()
+    bent = made.smooth * x
+    return 0.5 * float(bent.dot(x)) + bounds.evaluate(np.concatenate((x, -x)))[0]
 
 
 class SplineCost:

@@ -16,7 +16,7 @@ from repair.solvers.ego.minimise import Minimiser, Minimum, minimiser
 from repair.solvers.ego.pairs import Pairs, anchor_pairs, closest_distance
 from repair.solvers.ego.penalties import SoftBounds
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
-from repair.solvers.ego.spline_cost import SplineCost
+from repair.solvers.ego.spline_cost import SplineCost, resting_cost
 
 __all__ = ["Deformed", "Stages"]
 
@@ -89,11 +89,13 @@ class Stages:
         shape = _led_points(problem, initial, greville)
         pairs = anchor_pairs(problem, greville, shape, self.degree)
         minimum = Minimum(initial.points, np.inf, 0, False)
+        moved = pairs if problem.lateral else pairs.along(0)
+        resting = self._resting(problem, initial.points, spacing, config.deform)
         led = shape
         for rounds in range(1, config.rebounds + 2):
             cap = self._cap(problem, led)
             minimum = self._minimise_deformation(
-                problem, minimum.points, spacing, pairs, collision, cap, deadline
+                problem, minimum.points, spacing, moved, collision, cap, resting, deadline
             )
             if rounds > config.rebounds:
                 break
@@ -153,18 +155,16 @@ class Stages:
         pairs: Pairs,
         collision: float,
         cap: Array | None,
+        resting: float,
         deadline: float | None,
     ) -> Minimum:
         weights, n = self.config.deform, len(start)
-        if not problem.lateral:
-            pairs = pairs.along(0)
         axes = 2 if problem.lateral else 1
         bounds = with_pairs(self._bounds(problem, n, weights.feasible, cap), pairs, collision)
         cost = SplineCost(
             start[:, :axes], self.degree, n, spacing, weights.smooth, bounds,
             pairs.row * axes + pairs.axis, -pairs.sign,
-            constant=self._resting(problem, start, spacing, weights),
-            sizes=self.sizes,
+            constant=resting, sizes=self.sizes,
         )  # fmt: skip
         return self._whole(cost, start, deadline)
 
@@ -192,8 +192,7 @@ class Stages:
             return 0.0
         n = len(points)
         bounds = feasibility(n, problem.limits, self._penalties, weights.feasible, (1,))
-        cost = SplineCost(points[:, 1:], 0, n, spacing, weights.smooth, bounds, sizes=self.sizes)
-        return cost(np.zeros(n)).value
+        return resting_cost(points[:, 1:], spacing, weights.smooth, bounds, self.sizes)
 
     def _whole(
         self, cost: SplineCost, start: Array, deadline: float | None, near_closed_form: bool = False

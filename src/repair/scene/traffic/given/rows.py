@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -99,13 +99,21 @@ class _Row(NamedTuple):
 def _tables(chosen: list[tuple[int, Prediction]]) -> list[Array]:
     """Poses (T, 3) of each, looked at; those that are there throughout, as most are, all at once."""
     tables = [p.poses for _, p in chosen]
-    if tables and all(_plain(table) for table in tables) and np.isfinite(np.concatenate(tables)).all():
-        return tables
-    return [_table_of(p) for _, p in chosen]
+    if not tables or not all(map(_plain, tables)):
+        return [_table_of(p) for _, p in chosen]
+    finite = np.isfinite(np.concatenate(tables)).all(axis=1)
+    whole = np.logical_and.reduceat(finite, np.cumsum([0, *map(len, tables[:-1])])).tolist()
+    return [t if k else _table_of(p) for t, k, (_, p) in zip(tables, whole, chosen, strict=True)]
 
 
-def _plain(table: Any) -> bool:
-    return isinstance(table, np.ndarray) and table.dtype == float and table.ndim == 2 and table.shape[1] == 3
+def _plain(table: Any) -> TypeGuard[Array]:
+    return (
+        isinstance(table, np.ndarray)
+        and table.dtype == float
+        and table.ndim == 2
+        and table.shape[1] == 3
+        and len(table) > 0
+    )
 
 
 def _table_of(prediction: Prediction) -> Array:

@@ -98,8 +98,10 @@ def standing_as(
     following = max([_FAR, *roads, *(int(p.id) for p in predictions)]) + 1
     chosen: list[tuple[int, Prediction]] = []
     modes: list[Mode] = []
-    for name in dict.fromkeys(p.id for p in predictions):
-        own = [p for p in predictions if p.id == name]
+    by_name: dict[int, list[Prediction]] = {}
+    for p in predictions:
+        by_name.setdefault(p.id, []).append(p)
+    for name, own in by_name.items():
         kept = [p for p in own if p.probability >= threshold]
         if len(kept) < len(own):
             gone = ", ".join(f"{p.mode or 'unnamed'} ({p.probability:g})" for p in own if p not in kept)
