@@ -18,9 +18,9 @@ from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
 from repair.solvers.casadi.backend import CasadiBackend
 from repair.solvers.casadi.buffered import Buffered, KeptBySize
-from repair.solvers.casadi.instance import lay_out, limit_values, plane_acceleration
+from repair.solvers.casadi.instance import lay_out, limit_values
 from repair.solvers.casadi.model import Model, Solution, build_model, megabytes
-from repair.solvers.casadi.nlp import _nonlinear
+from repair.solvers.casadi.nlp import _nonlinear, plane_acceleration
 from repair.solvers.casadi.residuals import residuals_of
 from repair.solvers.casadi.rows import RowKind
 from repair.solvers.casadi.separation import NOBODY, ROAD, SIDE_OF_BOUND, road_room, separate

@@ -15,7 +15,7 @@ from repair.problem.lateral import kept_path
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.model import Model
-from repair.solvers.casadi.nlp import STANDSTILL
+from repair.solvers.casadi.nlp import axis_curvature, body, in_plane
 from repair.solvers.casadi.rows import SAMPLED, Datum, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
 from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
@@ -24,14 +24,10 @@ from repair.timegrid import INSTANT
 __all__ = [
     "ROAD_SLACK",
     "Instance",
-    "axis_curvature",
-    "body",
     "guide_of",
-    "in_plane",
     "lay_out",
     "limit_values",
     "overhang_of",
-    "plane_acceleration",
 ]
 
 ROAD_SLACK = 0.5  #: [m] of s either way of the last path over which the road must be wide enough
@@ -44,51 +40,11 @@ _INF = np.inf
 # Factors of the bounds by kind of row: those of the accelerations are taken in.
 _MODEST = np.ones(len(RowKind))
 _MODEST[[RowKind.ACCELERATION_S, RowKind.ACCELERATION_L]] = _FRICTION
-_STEP = 0.25  # [m] of s either way for the slope of the axis' curvature
-_AROUND = np.array([[0.0], [_STEP], [-_STEP]])
 
 
 def guide_of(problem: RepairProblem) -> Curve:
     """The curve that shows the way: the guide, or the reference where there is none."""
     return problem.reference if problem.passing is None else SampledCurve(problem.passing.guide)
-
-
-def axis_curvature(problem: RepairProblem, s: Array) -> tuple[Array, Array]:
-    """Curvature of the axis and its slope over s (K,)."""
-    kappa, ahead, behind = problem.curvature_at(s + _AROUND)
-    return kappa, (ahead - behind) / (2.0 * _STEP)
-
-
-def plane_acceleration(problem: RepairProblem, states: Array) -> tuple[Array, Array]:
-    """Acceleration along and across the axis (K,) of states (K, 3, 2)."""
-    return in_plane(*axis_curvature(problem, states[:, 0, 0]), states.swapaxes(0, 1))
-
-
-def in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
-    """Acceleration along and across the axis (K,) of states (3, K, 2) where its curvature is known."""
-    l, (v, w), (a, b) = states[0, :, 1], states[1].T, states[2].T  # noqa: E741
-    scale, square = 1.0 - kappa * l, v**2
-    return scale * a - 2.0 * kappa * v * w - slope * l * square, b + scale * kappa * square
-
-
-def body(
-    kappa: Array, states: Array, along: Array, across: Array, overhang: float
-) -> tuple[Array, Array, Array]:
-    """Curvature of the driven path, and l of the body's front and back (K,), of states (3, K, 2).
-
-    Parameters
-    ----------
-    kappa, along, across : (K,) array
-        Curvature of the axis, and the accelerations of :func:`in_plane`.
-    overhang : float
-        Half the length of the body [m].
-    """
-    l, (v, w) = states[0, :, 1], states[1].T  # noqa: E741
-    forward = (1.0 - kappa * l) * v
-    square = forward**2 + w**2 + STANDSTILL
-    speed = np.sqrt(square)
-    middle, swing = l - 0.5 * overhang**2 * kappa, overhang * w / speed
-    return (forward * across - w * along) / (square * speed), middle + swing, middle - swing
 
 
 @lru_cache(maxsize=128)

@@ -2,19 +2,25 @@
 
 Everything that is linear in the control points is a constant matrix
 (:mod:`repair.solvers.casadi.rows`); only the accelerations and the curvature of the driven path, and
-where the ends of the body are, are nonlinear.
+where the ends of the body are, are nonlinear. The same with NumPy stands below.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from repair.arrays import Array
+from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.buffered import Deadline, deadline_callback, sparse
 from repair.solvers.casadi.rows import SAMPLED, Datum, Layout, Structure
 
-__all__ = ["STANDSTILL", "make_nlp"]
+__all__ = ["axis_curvature", "body", "in_plane", "make_nlp", "plane_acceleration"]
 
-STANDSTILL = 0.01  #: added to the squared speed [m²/s²] where the path's curvature divides by it
+_STANDSTILL = 0.01  # added to the squared speed [m²/s²] where the path's curvature divides by it
+_STEP = 0.25  # [m] of s either way for the slope of the axis' curvature
+_AROUND = np.array([[0.0], [_STEP], [-_STEP]])
 
 
 def make_nlp(layout: Layout, hessian: Any, matrix: Any) -> tuple[Any, Deadline | None]:
@@ -90,7 +96,7 @@ def _nonlinear(layout: Layout, axes: list[Any], data: Any) -> tuple[Any, Any, li
     rest = []
     if layout.structure.lateral:
         forward = scale * v
-        square = forward**2 + w**2 + STANDSTILL
+        square = forward**2 + w**2 + _STANDSTILL
         middle = l - 0.5 * layout.structure.overhang**2 * kappa
         swing = layout.structure.overhang * w / square**0.5
         rest = [along, (forward * across - w * along) / square**1.5, middle + swing, middle - swing]
@@ -122,3 +128,41 @@ def _solver(s: Structure, nlp: dict[str, Any], curvature: Any) -> tuple[Any, Dea
             "hessian_approximation": "exact", "hess_lag": curvature,
         }  # fmt: skip
     return ca.nlpsol("repair", s.solver, nlp, options), watch
+
+
+def axis_curvature(problem: RepairProblem, s: Array) -> tuple[Array, Array]:
+    """Curvature of the axis and its slope over s (K,)."""
+    kappa, ahead, behind = problem.curvature_at(s + _AROUND)
+    return kappa, (ahead - behind) / (2.0 * _STEP)
+
+
+def plane_acceleration(problem: RepairProblem, states: Array) -> tuple[Array, Array]:
+    """Acceleration along and across the axis (K,) of states (K, 3, 2)."""
+    return in_plane(*axis_curvature(problem, states[:, 0, 0]), states.swapaxes(0, 1))
+
+
+def in_plane(kappa: Array, slope: Array, states: Array) -> tuple[Array, Array]:
+    """Acceleration along and across the axis (K,) of states (3, K, 2) where its curvature is known."""
+    l, (v, w), (a, b) = states[0, :, 1], states[1].T, states[2].T  # noqa: E741
+    scale, square = 1.0 - kappa * l, v**2
+    return scale * a - 2.0 * kappa * v * w - slope * l * square, b + scale * kappa * square
+
+
+def body(
+    kappa: Array, states: Array, along: Array, across: Array, overhang: float
+) -> tuple[Array, Array, Array]:
+    """Curvature of the driven path, and l of the body's front and back (K,), of states (3, K, 2).
+
+    Parameters
+    ----------
+    kappa, along, across : (K,) array
+        Curvature of the axis, and the accelerations of :func:`in_plane`.
+    overhang : float
+        Half the length of the body [m].
+    """
+    l, (v, w) = states[0, :, 1], states[1].T  # noqa: E741
+    forward = (1.0 - kappa * l) * v
+    square = forward**2 + w**2 + _STANDSTILL
+    speed = np.sqrt(square)
+    middle, swing = l - 0.5 * overhang**2 * kappa, overhang * w / speed
+    return (forward * across - w * along) / (square * speed), middle + swing, middle - swing

@@ -9,8 +9,9 @@ import numpy as np
 from repair.arrays import Array
 from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
-from repair.solvers.casadi.instance import Instance, axis_curvature, body, in_plane, plane_acceleration
+from repair.solvers.casadi.instance import Instance
 from repair.solvers.casadi.model import TOLERANCE
+from repair.solvers.casadi.nlp import axis_curvature, body, in_plane, plane_acceleration
 from repair.solvers.casadi.rows import FAMILIES, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
 from repair.timegrid import INSTANT
