@@ -208,8 +208,8 @@ def laid_out(
         Obstacles out of the ego's reach until the repairs end are left without boxes.
     """
     vehicle = scene.vehicle
-    s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
     room = config.checker.clearance + _BODY_MARGIN
+    s_offset, l_offset = config.scene.s_offset, config.scene.l_offset
     s_offset = vehicle.half_length + room if s_offset is None else s_offset
     l_offset = vehicle.half_width + room if l_offset is None else l_offset
     limits = resolve_limits(config.limits, vehicle, float(scene.start[1, 0]), scene.dt)
@@ -237,7 +237,7 @@ def laid_out(
             followed = make_reference(scene, config.reference, known)
     t_reference = min(scene.horizon, followed.t_end)
     places = followed.sample(np.arange(steps_until(t_reference, scene.dt) + 1) * scene.dt).position
-    boxes = Boxes(partial(_left_of, whole, places, touching, offsets))
+    boxes = whole.left_of(places, touching, offsets)
     more: tuple[str, ...] = ()
     with phases("conflict"):
         conflict, verdict = detect_conflict(followed, boxes, checker, t_reference)
@@ -258,12 +258,11 @@ def laid_out(
             "a repair has to reach beyond it"
         )
     logging.getLogger(__name__).info("%s: conflict %s at %g s", scene.id, conflict.kind, conflict.time)
-    t_end = min(wanted, t_reference)
-    t_end = max(on_grid(t_end, scene.dt), min(scene.dt, t_reference))
+    t_end = max(on_grid(min(wanted, t_reference), scene.dt), min(scene.dt, t_reference))
     if within_reach and not whole.known:
         # Control points act a little after the end as well; what is later than that, nobody asks.
-        late = 0.5 * config.repair.degree * config.repair.spacing
-        boxes = Boxes(partial(_left_of, all_boxes(t_end + late), places, touching, offsets))
+        until = t_end + 0.5 * config.repair.degree * config.repair.spacing
+        boxes = all_boxes(until).left_of(places, touching, offsets)
     return Prepared(
         scene=scene,
         settings=config.repair,
@@ -298,14 +297,6 @@ def _boxes(
     """The traffic as boxes, and who is not seen by them."""
     part = None if within is None else within()
     return build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets, part)
-
-
-def _left_of(
-    whole: Boxes, places: Array, touching: set[int], offsets: tuple[float, float]
-) -> tuple[Occupancy, tuple[str, ...]]:
-    """The boxes without the margins that the reference never had."""
-    occupancy, notes = shrink_to_start(whole.occupancy, places, touching, offsets)
-    return occupancy, (*whole.notes, *notes)
 
 
 def _said(

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from repair.check.limits import plane_accelerations, plane_excess, surely_kept
 from repair.check.peaks import peaks
 from repair.curves.bspline import UniformBSpline
-from repair.curves.plane import STANDSTILL, CartesianPath
-from repair.scene.frame import FrenetFrame, held_headings
+from repair.curves.plane import STANDSTILL, CartesianPath, held_headings
+from repair.scene.frame import FrenetFrame
 from repair.scene.traffic.obstacle import Obstacle
 from repair.vehicle import transitions_fast
 from repair.vehicle.parameters import load_vehicle

@@ -33,7 +33,8 @@ from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.timegrid import INSTANT, steps_until
 from repair.vehicle.states import DrivenStates
-from repair.world.collision import CollisionWorld, Contact
+from repair.world.collision import CollisionWorld
+from repair.world.contact import Contact
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath

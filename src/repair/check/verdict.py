@@ -7,7 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repair.world.collision import Contact
+    from repair.world.contact import Contact
 
 __all__ = ["Conflict", "Reason", "Verdict", "Violation", "met"]
 

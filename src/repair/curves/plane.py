@@ -8,7 +8,7 @@ import numpy as np
 
 from repair.arrays import Array, Points, largest
 
-__all__ = ["STANDSTILL", "CartesianPath"]
+__all__ = ["STANDSTILL", "CartesianPath", "held_headings"]
 
 STANDSTILL = 1e-2
 """Below this speed [m/s] the direction of motion is noise: a trajectory's heading is held."""
@@ -71,3 +71,27 @@ class CartesianPath(NamedTuple):
         distance = np.zeros(len(self.t))
         np.add.accumulate(self.step, out=distance[1:])
         return distance
+
+
+def held_headings(heading: Array, fallback: Array, pace: Array) -> Array:
+    """Headings with those of standing samples taken from the last (else the first) moving one.
+
+    Parameters
+    ----------
+    heading : (K,) array
+        Where the vehicle goes [rad]; without meaning where it stands.
+    fallback : (K,) array
+        Where the path goes; the first one holds for who never moves.
+    pace : (K,) array
+        How fast the vehicle is, whatever its direction [m/s].
+    """
+    moving = pace >= STANDSTILL
+    count = np.count_nonzero(moving)
+    if not count:
+        return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
+    if np.count_nonzero(moving[:count]) == count:  # it stops, and does not start again
+        held = heading.copy()
+        held[count:] = held[count - 1]
+        return held
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
+    return np.asarray(heading[np.where(last < 0, int(np.argmax(moving)), last)])

@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from repair.arrays import Array, Points, frozen, smallest
 from repair.curves.base import FrenetTrajectory
-from repair.curves.plane import STANDSTILL, CartesianPath
+from repair.curves.plane import STANDSTILL, CartesianPath, held_headings
 from repair.scene.smoothing import arc_length_table, cleaned, resampled, smoothed
 
-__all__ = ["FrenetFrame", "held_headings"]
+__all__ = ["FrenetFrame"]
 _DOMAIN = 0.05  # smallest 1 - kappa l at which a projection still counts as unique
 _NEWTON = 8
 # As arrays, because NumPy takes longer to convert a plain number than to multiply a row by it.
@@ -327,27 +327,3 @@ def _pairs(x: Array, y: Array) -> Array:
     made[..., 0] = x
     made[..., 1] = y
     return made
-
-
-def held_headings(heading: Array, fallback: Array, pace: Array) -> Array:
-    """Headings with those of standing samples taken from the last (else the first) moving one.
-
-    Parameters
-    ----------
-    heading : (K,) array
-        Where the vehicle goes [rad]; without meaning where it stands.
-    fallback : (K,) array
-        Where the path goes; the first one holds for who never moves.
-    pace : (K,) array
-        How fast the vehicle is, whatever its direction [m/s].
-    """
-    moving = pace >= STANDSTILL
-    count = np.count_nonzero(moving)
-    if not count:
-        return np.full_like(fallback, fallback[0]) if len(fallback) else fallback
-    if np.count_nonzero(moving[:count]) == count:  # it stops, and does not start again
-        held = heading.copy()
-        held[count:] = held[count - 1]
-        return held
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
-    return np.asarray(heading[np.where(last < 0, int(np.argmax(moving)), last)])

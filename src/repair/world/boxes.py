@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -136,10 +136,21 @@ class Boxes:
         """The obstacles, inflated."""
         return self._made[0]
 
+    def left_of(self, path: Array, touching: set[int], offsets: tuple[float, float]) -> Boxes:
+        """The same without the margins that a path never had; see :func:`shrink_to_start`."""
+        return Boxes(partial(_shrunk, self, path, touching, offsets))
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What had to be assumed."""
         return self._made[1]
+
+
+def _shrunk(
+    whole: Boxes, path: Array, touching: set[int], offsets: Sequence[float]
+) -> tuple[Occupancy, tuple[str, ...]]:
+    occupancy, notes = shrink_to_start(whole.occupancy, path, touching, offsets)
+    return occupancy, (*whole.notes, *notes)
 
 
 def shrink_to_start(

@@ -13,7 +13,6 @@ counts an occupancy that is stated for an interval of steps at one of them; here
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +23,7 @@ import numpy.typing as npt
 from repair.arrays import Array, Points
 from repair.deadline import in_time
 from repair.world.advance import first_touch
+from repair.world.contact import Contact, told
 from repair.world.table import TrackTable
 from repair.world.touching import CLOCKWISE, TOUCH, rectangles_touch
 from repair.world.tracks import POLYGON, RECTANGLE, Index, as_complex, ego_room
@@ -32,19 +32,7 @@ if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
     from repair.vehicle.parameters import Vehicle
 
-__all__ = ["CollisionWorld", "Contact"]
-
-
-class Contact(NamedTuple):
-    """First contact: time [s], the obstacle, whether it strikes from behind, and its velocity (x, y) [m/s].
-
-    The velocity is that of its centre within the scenario's step; zero for who has none, as some sets.
-    """
-
-    time: float
-    obstacle_id: int
-    from_behind: bool
-    velocity: tuple[float, float] = (0.0, 0.0)
+__all__ = ["CollisionWorld"]
 
 
 class _Hit(NamedTuple):
@@ -209,37 +197,11 @@ class CollisionWorld:
 
     def _told(self, found: _Hit, here: Points, orientation: Array) -> Contact:
         """A contact with what is to be said of it."""
-        k = found.sample
-        axis = cmath.rect(1.0, orientation.item(k))
-        centre, velocity = self._motion(found.obstacle, found.time)
-        ego = 0j
-        if len(here) > 1:
-            i = max(k - 1, 0)
-            ego = (here.item(i + 1) - here.item(i)) * self.substeps / self.dt
-        offset = ((centre - here.item(k)) * axis.conjugate()).real
-        closing = ((velocity - ego) * axis.conjugate()).real
-        behind = offset < -0.5 * self._half.real and closing > 0.0
-        vx, vy = (0.0 if math.isnan(v) else v for v in (velocity.real, velocity.imag))
-        return Contact(found.time, self._obstacles[found.obstacle].id, behind, (vx, vy))
-
-    def _motion(self, index: int, time: float) -> tuple[complex, complex]:
-        """Centre and velocity of an obstacle at a time."""
-        states = self._obstacles[index].states
-        place = min(time / self.dt, len(states) - 1)
-        low = int(place + 1e-9)
-        first = max(min(low, len(states) - 2), 0)
-        weight = place - low
-        centre = complex(*states[low, :2].tolist())
-        if not weight < 1e-9:
-            centre = (1 - weight) * centre + weight * complex(*states[low + 1, :2].tolist())
-        if len(states) < 2:
-            return centre, 0j
-        here, there = (complex(*states[k, :2].tolist()) for k in (first, first + 1))
-        velocity = (there - here) / self.dt
-        if not cmath.isfinite(velocity):
-            heading, speed = states[low, 2:4].tolist()
-            velocity = speed * complex(math.cos(heading), math.sin(heading))
-        return centre, velocity
+        k, one = found.sample, self._obstacles[found.obstacle]
+        i = max(k - 1, 0)
+        ego = (here.item(i + 1) - here.item(i)) * self.substeps / self.dt if len(here) > 1 else 0j
+        pose = here.item(k), orientation.item(k)
+        return told(found.time, one, self.dt, pose, ego, self._half.real)
 
     def _first(
         self, here: Points, orientation: Array, start: int, step: float | None, asked: _Asked
