@@ -50,6 +50,15 @@ class Registry(Generic[T]):
         self._registered: dict[str, T] = {}
         self._offered: dict[str, T] | None = None
         self._broken: dict[str, str] = {}
+        self._reserved: dict[str, str] = {}
+
+    def reserve(self, names: Iterable[str], why: str) -> None:
+        """Names that nothing from outside of the package may have, and the reason.
+
+        What an installed package offers under one of them is an error only for who asks for it.
+        """
+        self._reserved |= dict.fromkeys(names, why)
+        self._offered = None  # some of it may have been let in
 
     def register(self, name: str, thing: T) -> None:
         """Add a thing for this process.
@@ -57,10 +66,12 @@ class Registry(Generic[T]):
         Raises
         ------
         RepairError
-            If the name is taken, or is no identifier.
+            If the name is taken or reserved, or is no identifier.
         """
         if not isinstance(name, str) or not name.isidentifier():
             raise self.error(f"a {self.kind} needs a name that is an identifier, not {name!r}")
+        if name in self._reserved:
+            raise self.error(f"a {self.kind} cannot have the name {name!r}: {self._reserved[name]}")
         if name in self._everything():
             raise self.error(f"there is a {self.kind} {name!r} already; register yours under another name")
         self._registered[name] = thing
@@ -104,14 +115,16 @@ class Registry(Generic[T]):
 
     def _everything(self) -> dict[str, T]:
         if self._offered is None:
+            self._broken.clear()
             self._offered = self._load() if self.group else {}
         return {**self._own, **self._offered, **self._registered}
 
     def _load(self) -> dict[str, T]:
         found: dict[str, T] = {}
         for name, point in sorted(_entry_points().get(self.group or "", {}).items()):
-            if name in self._own:
-                self._broken[name] = f"the package has a {self.kind} of that name itself"
+            taken = f"the package has a {self.kind} of that name itself" if name in self._own else None
+            if why := taken or self._reserved.get(name):
+                self._broken[name] = why
                 continue
             try:
                 thing = point.load()

@@ -158,3 +158,11 @@ def test_a_check_and_a_metric_are_functions(installed, path):
     assert (
         repair.repair(path, overrides=["checker.extra=[fine]", "reference.source=constant"]).status == "found"
     )
+
+
+def test_a_backend_with_the_name_of_a_key_harms_only_who_asks_for_it(installed):
+    installed(BACKENDS, search=repair.BackendSpec(lambda config: None, Firm))
+    assert repair.load_config().search.delta_t == 0.4
+    assert "the configuration has a key of that name" in available()["search"]
+    with pytest.raises(RepairError, match="of an installed package cannot be loaded: the configuration has"):
+        make_backend("search", repair.load_config(backend="search"))

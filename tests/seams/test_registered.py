@@ -94,8 +94,15 @@ def test_a_backend(path):
 
 @pytest.mark.parametrize("name", ["search", "scenario", "for_backend"])
 def test_a_section_may_not_hide_a_key(name):
-    repair.register_backend(name, lambda config: None, settings=LazyConfig)
-    with refused(f"'{name}' cannot have a section"):
+    repair.load_config()
+    with refused(f"cannot have the name '{name}': the configuration has a key of that name"):
+        repair.register_backend(name, lambda config: None, settings=LazyConfig)
+
+
+def test_a_section_that_was_registered_before_there_was_a_configuration_hides_no_key(monkeypatch):
+    monkeypatch.setattr(BACKENDS, "_reserved", {})
+    repair.register_backend("search", lambda config: None, settings=LazyConfig)
+    with refused("'search' cannot have a section"):
         repair.load_config()
 
 

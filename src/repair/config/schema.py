@@ -131,6 +131,10 @@ class Config:
         return _restored, (values, self.given)
 
 
+# A section of that name would stand in its place.
+BACKENDS.reserve([item.name for item in fields(Config)], "the configuration has a key of that name")
+
+
 def _restored(values: dict[str, Any], given: frozenset[str]) -> Config:
     config = Config(**values)
     config.given = given
