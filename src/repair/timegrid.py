@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["INSTANT", "ROUNDING", "STEP", "intervals", "on_grid", "steps_until"]
+__all__ = ["INSTANT", "ROUNDING", "SHORT", "STEP", "intervals", "on_grid", "steps_until"]
 
 #: Share of a step by which a time may be off it.
 STEP = 1e-6
@@ -17,6 +17,8 @@ INSTANT = 1e-9
 #: By how much rounding alone moves a multiple of a step [s]: what is tabulated by step is looked up this
 #: near to it only, since a time farther off has values of its own.
 ROUNDING = 1e-12
+#: [s]; a scenario's step below it is no reason to look at curves, or to change controls, more often.
+SHORT = 0.04
 
 
 def steps_until(t: float, step: float) -> int:

@@ -11,6 +11,7 @@ from tests import roads
 from repair.arrays import frozen
 from repair.check.checker import Checker
 from repair.check.limits import curve_excess, plane_excess
+from repair.check.settings import CheckerConfig, sampled
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
@@ -133,6 +134,24 @@ def test_times_are_the_scenario_steps_and_what_lies_between(prepared):
     assert len(prepared.checker.times(1e9)) == prepared.scene.n_steps * 4 + 1
     with pytest.raises(ValueError, match="read-only"):
         times[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    "dt, substeps, expected",
+    [
+        (0.1, 4, 4),
+        (0.04, 4, 4),
+        (0.04, 10, 10),
+        (0.02, 4, 2),
+        (0.01, 4, 1),
+        (0.01, 10, 3),
+        (1e-3, 4, 1),
+        (0.5, 4, 8),
+    ],
+)
+def test_a_short_step_is_no_reason_to_look_more_often(dt, substeps, expected):
+    """Each step is looked at; in between as often as a step of 0.04 s has it, and longer ones more often."""
+    assert sampled(CheckerConfig(substeps=substeps), dt).substeps == expected
 
 
 def test_a_curve_that_is_not_finite_is_no_trajectory(prepared):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.contract import problems
@@ -18,6 +20,7 @@ from repair.baselines.qptr.qp_solvers import OSQP_TOLERANCES, SETTINGS, osqp_ans
 from repair.baselines.qptr.qp_trial import braking_problem, require_solver
 from repair.baselines.qptr.settings import QptrConfig
 from repair.baselines.qptr.time_grid import time_grid
+from repair.baselines.qptr.walls import line_below
 from repair.config import load_config
 from repair.curves.base import FrenetTrajectory
 from repair.errors import BackendError, ConfigError
@@ -113,6 +116,26 @@ def test_the_times_of_a_piece_lead_from_edge_to_edge():
         grid = time_grid(problem([], t_rep=t_rep, t_end=t_end), 7)
         np.testing.assert_allclose(grid.times[grid.index[:, 0]], grid.edges[:-1])
         np.testing.assert_allclose(grid.times[grid.index[:, -1]], grid.edges[1:])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_line_below_many_points_is_that_of_all_pairs(seed):
+    """Many times are taken by the hull of their points, few by all pairs: the same lines."""
+    random = np.random.default_rng(seed)
+    grid = time_grid(problem([], t_rep=0.33, t_end=4.0), 7)
+    at = 8.0 * grid.times + random.normal(0.0, 0.3, len(grid.times))
+    guide, values = at[grid.index], (at + random.uniform(-1.0, 20.0, len(at)))[grid.index]
+    assert len(grid.base) > 0
+    by_hull = replace(grid, base=grid.base[:0], second=grid.second[:0], ratio=grid.ratio[..., :0])
+    np.testing.assert_allclose(line_below(by_hull, values, guide), line_below(grid, values, guide), atol=1e-5)
+
+
+def test_a_short_time_step_adds_no_pairs_of_times():
+    steps = np.arange(801) * 0.01
+    short = replace(problem([]).occupancy, t=steps, lower=np.empty((0, 801, 2)), upper=np.empty((0, 801, 2)))
+    grid = time_grid(replace(problem([], t_rep=0.0, t_end=4.0), occupancy=short), 8)
+    assert grid.index.shape == (8, 51)
+    assert grid.ratio.nbytes < 10 * grid.index.nbytes
 
 
 def test_a_corridor_is_open_or_refused():

@@ -145,6 +145,8 @@ def test_true_shapes_are_passed_where_their_boxes_are_shut():
         (0.1, 0.04, 1, 2, 1),
         (0.0, 0.25, 0, 1, 1),
         (0.1, 0.3, 2, 3, 2),
+        (0.3, 0.01, 0, 1, 0),
+        (0.0, 0.03, 0, 1, 1),
     ],
 )
 def test_controls_change_at_the_scenarios_steps_only(t_rep, dt, lead, each, straight):
@@ -161,6 +163,14 @@ def test_controls_change_at_the_scenarios_steps_only(t_rep, dt, lead, each, stra
     np.testing.assert_allclose(place, np.rint(place), atol=1e-6)
     assert (FREE.steering(rows, steps)[:, :straight] == 0.0).all()
     assert (FREE.tail(rows, steps).step >= straight).all()
+
+
+@pytest.mark.parametrize("dt, expected", [(0.1, 0.1), (0.04, 0.04), (0.03, 0.09), (0.01, 0.1), (1e-3, 0.1)])
+def test_short_steps_of_a_scenario_are_driven_together(dt, expected):
+    """What a search costs does not grow with the scenario's resolution, where t_rep is one of its steps."""
+    steps = Steps.between(1.2, 3.9, dt)
+    assert steps.dt == pytest.approx(expected)
+    assert steps.count == np.ceil(2.7 / expected - 1e-6)
 
 
 def test_what_comes_closest_is_handed_over():

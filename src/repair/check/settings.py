@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from repair.settings import setting
+from repair.timegrid import SHORT, intervals
 
 __all__ = ["CheckerConfig", "sampled"]
 
-_APART = 0.0625  # [s]
+_APART = 0.0625  # [s] between two samples
 
 
 @dataclass
@@ -19,7 +19,7 @@ class CheckerConfig:
     substeps: int = setting(
         4,
         "samples per scenario step at which the road is looked at and the ego's curve is followed; more "
-        "where they would be more than 0.0625 s apart",
+        "where they would be more than 0.0625 s apart; at steps below 0.04 s as far apart as at 0.04 s",
         low=1,
         high=50,
     )
@@ -70,7 +70,10 @@ class CheckerConfig:
 
 
 def sampled(config: CheckerConfig, dt: float) -> CheckerConfig:
-    """The same with samples that are close enough at long steps: between them the ego moves along a chord.
+    """The same with samples that are close enough at long steps, and no closer than needed at short ones.
+
+    Between samples the ego moves along a chord, and contact is looked for in between as well; every step is
+    a sample at least.
 
     Parameters
     ----------
@@ -78,4 +81,5 @@ def sampled(config: CheckerConfig, dt: float) -> CheckerConfig:
     dt : float
         Scenario time step [s].
     """
-    return replace(config, substeps=max(config.substeps, math.ceil(dt / _APART - 1e-9)))
+    wanted = intervals(min(dt / SHORT, 1.0) * config.substeps, 1.0)
+    return replace(config, substeps=max(wanted, intervals(dt, _APART), 1))

@@ -101,17 +101,23 @@ class BernsteinCurve:
         return FrenetTrajectory(times, position, velocity, acceleration, jerk)
 
 
-def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
-    """Values (N, 4 K) of position to jerk at the ``offsets`` since the start."""
+def _local_sampling(
+    offsets: bytes, pieces: int, degree: int, duration: float
+) -> tuple[npt.NDArray[np.intp], Array]:
+    """The piece (K,) at each of the ``offsets`` since the start, and position to jerk (4, K, n + 1) there."""
     tau = np.frombuffer(offsets) / duration
     piece = np.clip(np.floor(tau + 1e-9), 0, pieces - 1).astype(np.intp)
     u = np.clip(tau - piece, 0.0, 1.0)
-    rows = np.zeros((4, len(tau), pieces, degree + 1))
-    for order in range(4):
-        rows[order, np.arange(len(tau)), piece] = bernstein_basis(u, degree - order) @ derivative_map(
-            1, degree, duration, order
-        )
-    return frozen(np.ascontiguousarray(rows.reshape(4 * len(tau), -1).T))
+    orders = [bernstein_basis(u, degree - k) @ derivative_map(1, degree, duration, k) for k in range(4)]
+    return piece, np.asarray(orders)
+
+
+def _sampling(offsets: bytes, pieces: int, degree: int, duration: float) -> Array:
+    """Values (N, 4 K) of position to jerk at the ``offsets`` since the start."""
+    piece, local = _local_sampling(offsets, pieces, degree, duration)
+    rows = np.zeros((4, len(piece), pieces, degree + 1))
+    rows[:, np.arange(len(piece)), piece] = local
+    return frozen(np.ascontiguousarray(rows.reshape(4 * len(piece), -1).T))
 
 
 @lru_cache(maxsize=64)
@@ -133,12 +139,22 @@ def sampling_at(
         Times * points up to which the matrix is a dense one.
     """
     t_end = t_start + pieces * duration
-    matrix = hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, pieces, degree, duration))
-    if matrix.size <= 4 * dense:
-        return matrix
+    width = degree + 1
+    if len(times) // 8 * pieces * width <= dense:
+        return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, pieces, degree, duration))
     from scipy.sparse import csr_array
 
-    return csr_array(matrix.T)
+    found: list[npt.NDArray[np.intp]] = []
+
+    def alive(offsets: bytes) -> Array:
+        piece, local = _local_sampling(offsets, pieces, degree, duration)
+        found.append(piece)
+        return local.reshape(-1, width).T
+
+    weights = hold_ends(times, t_start, t_end, alive).T
+    columns = np.tile(width * found[0][:, None] + np.arange(width), (4, 1))
+    rows = np.arange(0, weights.size + 1, width)
+    return csr_array((weights.ravel(), columns.ravel(), rows), shape=(len(weights), pieces * width))
 
 
 def derivative_map(pieces: int, degree: int, duration: float, order: int) -> Array:

@@ -37,6 +37,7 @@ __all__ = ["TrackTable"]
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
 _NOBODY: frozenset[int] = frozenset()
+_BLOCK = 8  # samples that are looked at together, at least
 
 
 class TrackTable:
@@ -73,7 +74,7 @@ class TrackTable:
     """
 
     def __init__(self, obstacles: Sequence[Obstacle], n_samples: int, substeps: int, radius: float) -> None:
-        self.n_samples, self._block = n_samples, 2 * substeps
+        self.n_samples, self._block = n_samples, max(2 * substeps, _BLOCK)
         self.tracks: list[Track] = []
         self.owner: list[int] = []
         self._lefts: dict[tuple[int, int], tuple[Left, float]] = {}

@@ -14,6 +14,8 @@ from repair.timegrid import INSTANT
 
 __all__ = ["TimeGrid", "time_grid"]
 
+_FEW = 20  # times of a piece up to which all pairs of them are tried at once
+
 
 @dataclass(frozen=True)
 class TimeGrid:
@@ -29,9 +31,10 @@ class TimeGrid:
         Which of them belong to each piece, from edge to edge; a shorter row repeats its last one.
     base, second : (C,) int array
         The two points of each candidate line of :func:`repair.baselines.qptr.walls.line_below`, among
-        those of a piece and the same again a piece later.
+        those of a piece and the same again a piece later. No lines where a piece has many times: there are
+        half as many pairs as their square, and each line is looked at at all of them.
     ratio : (L, M, C) array
-        How far each time is on the way from one to the other; NaN where both are one.
+        How far each time is on the way from one to the other; NaN where both are one. Empty without pairs.
     """
 
     edges: Array
@@ -58,7 +61,8 @@ def _time_grid(t_start: float, t_end: float, pieces: int, occupied: bytes) -> Ti
     first = np.searchsorted(times, edges[:-1] - INSTANT)
     last = np.searchsorted(times, edges[1:] + INSTANT, side="right") - 1
     index = np.minimum(first[:, None] + np.arange((last - first).max() + 1), last[:, None])
-    base, second = _candidates(index.shape[1])
+    many = index.shape[1] > _FEW
+    base, second = _candidates(0 if many else index.shape[1])
     t = times[index]
     start = t.take(base, axis=1)
     span = np.hstack([t, t + t[:, -1:] - t[:, :1]]).take(second, axis=1) - start

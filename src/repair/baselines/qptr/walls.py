@@ -115,6 +115,9 @@ def line_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
     values, guide : (M, L) array
         At the times of the pieces.
     """
+    if not len(grid.base):
+        rows = zip(grid.times.take(grid.index), values, guide, strict=True)
+        return np.array([_supporting(*row) for row in rows])
     moved = values + (guide[:, -1:] - guide[:, :1])  # where the guide's mean slope leads in a piece's time
     points = np.concatenate((values, moved), axis=1)
     through = points.take(grid.base, axis=1)
@@ -126,6 +129,33 @@ def line_below(grid: TimeGrid, values: Array, guide: Array) -> Array:
     gap = np.minimum.reduce(lines - guide.T[:, :, None])
     best = np.where(below, gap, -np.inf).argmax(axis=1)
     return np.asarray(lines[:: len(lines) - 1, np.arange(len(best)), best].T)
+
+
+def _supporting(t: Array, values: Array, guide: Array) -> Array:
+    """The same (2,) of one piece with many times (L,), by the hull of its points.
+
+    A line below all points that goes through two of them is an edge of their hull, and of given slope the
+    best is the highest: the one that touches it.
+    """
+    kept = np.append(True, np.diff(t) > 0.0)  # a shorter row repeats its last time
+    t, values, guide = t[kept], values[kept], guide[kept]
+    corner: list[tuple[float, float]] = []
+    for x, y in zip(t.tolist(), values.tolist(), strict=True):
+        while len(corner) > 1 and _above(corner[-2], corner[-1], (x, y)):
+            corner.pop()
+        corner.append((x, y))
+    x, y = np.array(corner).T
+    slopes = np.append(np.diff(y) / np.diff(x), (guide[-1] - guide[0]) / (t[-1] - t[0]))
+    rise = slopes[:, None] * (t - t[0])
+    lines = rise + (values - rise).min(axis=1, keepdims=True)
+    best = (lines - guide).min(axis=1).argmax()
+    return np.asarray(lines[best, [0, -1]])
+
+
+def _above(before: tuple[float, float], middle: tuple[float, float], after: tuple[float, float]) -> bool:
+    """Whether the point in the middle is no corner of the hull below."""
+    (a, u), (b, v), (c, w) = before, middle, after
+    return (v - u) * (c - a) >= (w - u) * (b - a)
 
 
 def cut_to_road(problem: RepairProblem, s: Array, sideways: Array) -> None:

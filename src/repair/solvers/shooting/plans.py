@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.solvers.shooting.motion import Tail
-from repair.timegrid import INSTANT, STEP, intervals
+from repair.timegrid import INSTANT, SHORT, STEP, intervals, steps_until
 
 __all__ = ["ALONG", "FREE", "Plan", "Steps", "first_along", "first_freely"]
 
@@ -18,12 +18,13 @@ __all__ = ["ALONG", "FREE", "Plan", "Steps", "first_along", "first_freely"]
 _PEDAL = (0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.4)
 _WHEEL = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.1, 2.4)
 _PARTS = 10  # of a scenario's step at most
+_JOINED = 0.1  # short steps of a scenario are one until then [s]
 _WIDEST = 5.0  # offset of the path that is followed in the end [m]
 
 
 @dataclass(frozen=True)
 class Steps:
-    """The steps that are driven: whole parts of the scenario's, within which no control changes.
+    """The steps that are driven, within which no control changes: whole parts of the scenario's, or several.
 
     Attributes
     ----------
@@ -49,7 +50,8 @@ class Steps:
     def between(cls, t_rep: float, t_end: float, dt: float) -> Steps:
         """From ``t_rep`` to ``t_end``, of a scenario with steps of ``dt`` [s].
 
-        Where the scenario's steps and t_rep have no small step in common, the steps begin at t_rep.
+        Where the scenario's steps and t_rep have no small step in common, the steps begin at t_rep. Of short
+        steps of the scenario several are one.
         """
         rest = intervals(t_rep, dt) * dt - t_rep
         for each in range(1, _PARTS + 1):
@@ -58,6 +60,9 @@ class Steps:
                 first = round(lead)
                 # The body stands as it does at the very start, and a path that bends at once would turn it.
                 straight = each if t_rep < INSTANT else first
+                if each == 1 and dt < SHORT * (1.0 - STEP):
+                    joined = steps_until(_JOINED, dt) * dt
+                    return cls(max(intervals(t_end - t_rep, joined), 1), joined, straight=straight)
                 count = max(intervals(t_end - t_rep, dt / each), 1)
                 return cls(count, dt / each, first, each, straight)
         return cls(max(intervals(t_end - t_rep, dt), 1), dt)

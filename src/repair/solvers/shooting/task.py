@@ -17,6 +17,7 @@ from repair.solvers.shooting.motion import Car, Driven, drive_along, drive_freel
 from repair.solvers.shooting.plans import Plan, Steps, first_along, first_freely
 from repair.solvers.shooting.settings import ShootingConfig
 from repair.solvers.shooting.space import Space
+from repair.timegrid import SHORT
 from repair.vehicle.parameters import Vehicle, load_vehicle
 from repair.vehicle.single_track import body_angles
 
@@ -199,14 +200,14 @@ class Task:
         problem, shapes = self.problem, self.problem.shapes
         if shapes is None:
             return False
-        times = np.arange(problem.t_rep, problem.t_end, 0.25 * problem.dt)
+        times = np.arange(problem.t_rep, problem.t_end, 0.25 * max(problem.dt, SHORT))
         samples = curve.sample(times)
         return bool(plane_excess(curve, samples, shapes.frame, problem.limits, shapes.vehicle, 0.0))
 
 
 def _slip(problem: RepairProblem, vehicle: Vehicle) -> float:
     """Slip angle at t_rep of who has followed the reference until then [rad]."""
-    shapes, times = problem.shapes, np.arange(problem.t_rep, -1e-9, -0.25 * problem.dt)[::-1]
+    shapes, times = problem.shapes, np.arange(problem.t_rep, -1e-9, -0.25 * max(problem.dt, SHORT))[::-1]
     if shapes is None or len(times) < 3:
         kappa = float(problem.curvature_at(problem.start[0, 0]))
         return float(np.arcsin(np.clip(vehicle.rear * kappa, -0.9, 0.9)))
