@@ -5,24 +5,24 @@
 
 The files are resampled to the finer step (:func:`benchmarks.limits.resampled`); the grid of the search stays.
 Times are processor times of warm searches, nobody asked instead (``fallback`` empty). For the memory each
-search is another one: file, reference, backend, and the horizon after the conflict, in steps of 0.05 s.
+search is another one: file, reference, backend, and the horizon after the conflict, in steps of 0.05 s. All
+backends take turns, and each file is read once.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import re
 import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.cycle import resident
 from benchmarks.limits import REFERENCES, resampled
 from repair.api import find
 from repair.config import load_config
@@ -32,20 +32,42 @@ from repair.scene.commonroad import load_scene
 from repair.solvers.registry import make_backend
 
 COARSE, FINE = 0.1, 0.01  # [s]
-WAYS = {"ego": (), "qptr": (), "casadi": ("casadi.solver=sqpmethod",)}
+# The backend's name, then what it is told.
+WAYS = {
+    "ego": ("ego",),
+    "qptr": ("qptr",),
+    "casadi": ("casadi", "casadi.solver=sqpmethod"),
+    "ipopt": ("casadi", "casadi.solver=ipopt"),
+    "shooting": ("shooting",),
+    "portfolio": ("portfolio",),
+}
+MEASURED = ("ego", "qptr", "casadi", "ipopt")
 
 
-def prepared(file: Path, reference: str, backend: str, *keys: str) -> Any:
-    """Something to search, with its backend; None where there is no conflict that can be avoided."""
-    overrides = [f"reference.source={reference}", "fallback=[]", *WAYS[backend], *keys]
+def prepared(file: Any, reference: str, way: str, *keys: str) -> Any:
+    """Something to search, with its backend; None where there is no conflict that can be avoided.
+
+    ``file`` is a path, or its scene.
+    """
+    backend, *told = WAYS[way]
+    overrides = [f"reference.source={reference}", "fallback=[]", *told, *keys]
     config = load_config(backend=backend, overrides=overrides)
     try:
-        made = prepare(load_scene(file, config), config)
+        made = prepare(load_scene(file, config) if isinstance(file, Path) else file, config)
     except RepairError:
         return None
     if not np.isfinite(made.conflict.time) or made.conflict.contact_time <= 0.0:
         return None
     return made, make_backend(backend, config)
+
+
+def megabytes() -> tuple[int, int]:
+    """Memory of this process, now and at most so far [MB]."""
+    status = Path("/proc/self/status").read_text(encoding="utf-8")
+    now, most = (re.search(rf"{name}:\s+(\d+)", status) for name in ("VmRSS", "VmHWM"))
+    assert now is not None
+    assert most is not None
+    return int(now[1]) // 1024, int(most[1]) // 1024
 
 
 def seconds(made: Any) -> float:
@@ -73,30 +95,32 @@ def finer(files: list[Path], backends: list[str]) -> None:
             p50, p95 = np.percentile(ratios, (50, 95))
             print(
                 f"{backend}: {len(ratios)} searches, at {FINE} s {p50:.1f} times as long as at {COARSE} s in "
-                f"the median, {p95:.1f} at the 95th percentile"
+                f"the median, {p95:.1f} at the 95th percentile, {max(ratios):.1f} at most"
             )
 
 
-def different(files: list[Path], backends: list[str]) -> Iterator[tuple[Path, str, str, str]]:
-    """Searches that are all different."""
-    for k in itertools.count():
-        for file, reference, backend in itertools.product(files, REFERENCES, backends):
-            yield file, reference, backend, f"repair.after_conflict={1.0 + 0.05 * k:g}"
-
-
-def memory(files: list[Path], backends: list[str], count: int) -> None:
+def memory(files: list[Path], ways: list[str], count: int) -> None:
     """Print how much memory the process takes on the way."""
-    done, begin = 0, resident()
-    for file, reference, backend, key in different(files, backends):
-        made = prepared(file, reference, backend, key)
-        if made is None:
+    done, begin = 0, megabytes()[0]
+    each = -(-count // (len(files) * len(REFERENCES)))
+    for number, file in enumerate(files):
+        try:
+            scene = load_scene(file)
+        except RepairError:
             continue
-        find(*made)
-        done += 1
-        if done % max(count // 10, 1) == 0:
-            print(f"{done} searches: {resident():.0f} MB (at the start {begin:.0f} MB)", flush=True)
-        if done >= count:
-            return
+        for reference, k in itertools.product(REFERENCES, range(2 * each)):  # many have no conflict
+            way, after = ways[(number + k) % len(ways)], 1.0 + 0.05 * (k + number % 7)
+            made = prepared(scene, reference, way, f"repair.after_conflict={after:g}")
+            if made is None:
+                continue
+            find(*made)
+            done += 1
+            if done % max(count // 20, 1) == 0:
+                now, most = megabytes()
+                print(f"{done} searches: {now} MB, at most {most} MB (at the start {begin} MB)", flush=True)
+            if done == count:
+                return
+    print(f"{done} searches: no more conflicts in these files")
 
 
 def main() -> int:
@@ -104,16 +128,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.steps", description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--files", type=int, default=12, help="spread over the folder")
-    parser.add_argument("--backend", nargs="+", default=list(WAYS), choices=list(WAYS))
+    parser.add_argument("--backend", nargs="+", choices=list(WAYS), help="default: all that are measured")
     parser.add_argument("--memory", type=int, metavar="SEARCHES")
     arguments = parser.parse_args()
     files = sorted(arguments.folder.glob("*.xml"))
     spread = np.unique(np.linspace(0, len(files) - 1, arguments.files).round().astype(int))
     chosen = [files[k] for k in spread]
     if arguments.memory:
-        memory(chosen, arguments.backend, arguments.memory)
+        memory(chosen, arguments.backend or list(WAYS), arguments.memory)
     else:
-        finer(chosen, arguments.backend)
+        finer(chosen, arguments.backend or list(MEASURED))
     return 0
 
 

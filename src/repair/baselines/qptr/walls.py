@@ -16,6 +16,7 @@ from repair.problem.problem import RepairProblem, Side
 __all__ = ["TOLERANCE", "cut_to_road", "line_below", "walls_along", "walls_around"]
 
 TOLERANCE = 1e-6  #: a bound [m] that is missed by less is kept
+_STRAIGHT = 1e-7  # [m/s]; what changes its slope by less goes on straight
 _AROUND = np.array([-2.0, 0.0, 2.0])[:, None, None]  # the lateral room counts here along the guide [m]
 _COUNT = len(Side)
 _SIDES = np.arange(_COUNT)
@@ -139,8 +140,11 @@ def _supporting(t: Array, values: Array, guide: Array) -> Array:
     """
     kept = np.append(True, np.diff(t) > 0.0)  # a shorter row repeats its last time
     t, values, guide = t[kept], values[kept], guide[kept]
+    # Most points lie on a line with their neighbours, or above it, and are no corners.
+    bent = np.diff(values[1:]) / np.diff(t[1:]) > np.diff(values[:-1]) / np.diff(t[:-1]) + _STRAIGHT
+    some = np.concatenate(([True], bent, [True]))
     corner: list[tuple[float, float]] = []
-    for x, y in zip(t.tolist(), values.tolist(), strict=True):
+    for x, y in zip(t[some].tolist(), values[some].tolist(), strict=True):
         while len(corner) > 1 and _above(corner[-2], corner[-1], (x, y)):
             corner.pop()
         corner.append((x, y))
