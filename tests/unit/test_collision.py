@@ -12,8 +12,8 @@ from repair.scene.traffic.late import steps_late
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import obstacles_of
 from repair.vehicle.parameters import load_vehicle
+from repair.world.advance import polygons_left
 from repair.world.collision import CollisionWorld
-from repair.world.polygons import polygons_left
 from repair.world.road import RoadBoundary
 from repair.world.touching import rectangles_touch
 

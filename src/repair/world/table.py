@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repair.arrays import Array, Points, wrap
-from repair.world.advance import Left, Motion, circle_left, rectangle_left
-from repair.world.polygons import polygons_left
+from repair.world.advance import Left, Motion, circle_left, polygons_left, rectangle_left
 from repair.world.tracks import (
     AFTER,
     BEFORE,
