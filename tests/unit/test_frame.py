@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from repair.arrays import Array
@@ -12,6 +12,7 @@ from repair.curves.base import FrenetTrajectory
 from repair.curves.plane import STANDSTILL
 from repair.errors import ScenarioError
 from repair.scene.frame import FrenetFrame
+from repair.scene.road.beside import alone, to_frenet_from
 
 TURN_RADIUS = 8.0
 
@@ -93,6 +94,31 @@ def test_projection_outside_of_the_domain(frame: FrenetFrame) -> None:
     np.testing.assert_allclose(frame.to_frenet(np.array([-130.0, 2.0])), [-100.0, 2.0], atol=0.1)
     assert frame.to_frenet(np.zeros((0, 2))).shape == (0, 2)
     assert frame.to_frenet(np.zeros((3, 4, 2))).shape == (3, 4, 2)
+
+
+@settings(max_examples=40, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_from_a_place_near_by_it_is_the_same_projection(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    heading = np.cumsum(rng.normal(0.0, rng.choice([0.02, 0.1, 0.25]), 60))
+    path = np.cumsum(np.column_stack([np.cos(heading), np.sin(heading)]) * 3.0, axis=0)
+    frame = FrenetFrame.from_points(path, max_lateral=20.0)
+    middle = path[rng.integers(0, len(path), 40)] + rng.normal(0.0, rng.choice([2.0, 12.0]), (40, 2))
+    outlines = middle[:, None] + rng.uniform(-3.0, 3.0, (40, 5, 2))
+    points, start = outlines.reshape(-1, 2), frame.to_frenet(middle)[:, 0].repeat(5)
+    np.testing.assert_allclose(to_frenet_from(frame, points, start), frame.to_frenet(points), atol=1e-9)
+    # and from anywhere: where that is too far, it is searched for
+    start = rng.uniform(0.0, frame.length, len(points))
+    np.testing.assert_allclose(to_frenet_from(frame, points, start), frame.to_frenet(points), atol=1e-9)
+
+
+def test_most_of_what_is_beside_a_road_is_known_to_be_nearest(frame: FrenetFrame) -> None:
+    s = np.linspace(1.0, frame.length - 1.0, 200)
+    for side in (-1.0, 1.0):
+        bend = np.maximum(side * frame.curvature(s), 0.0)
+        reach = alone(frame, s, np.full(200, side))
+        assert (reach <= 1.0 / np.maximum(bend, 1e-9)).all()
+        assert np.median(reach) > 4.0
 
 
 def test_near_picks_the_branch_where_the_path_passes_twice() -> None:

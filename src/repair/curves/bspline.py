@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,31 @@ def _sampling(offsets: bytes, n: int, degree: int, spacing: float) -> Array:
     tau = np.frombuffer(offsets)
     matrix = np.concatenate([basis_matrix(tau, n, degree, spacing, k) for k in range(4)])
     return frozen(np.ascontiguousarray(matrix.T))
+
+
+class _Alive(NamedTuple):
+    """Weights (p + 1, 4 K) of samples, the control points (4 K (p + 1),) they are of, and both in one."""
+
+    weights: Array
+    columns: npt.NDArray[np.intp]
+    matrix: Any
+
+
+@lru_cache(maxsize=64)
+def _alive(offsets: bytes, n: int, degree: int, spacing: float) -> _Alive:
+    """As :func:`_sampling`, for many samples."""
+    parts = [local_basis(np.frombuffer(offsets), n, degree, spacing, k) for k in range(4)]
+    weights = frozen(np.concatenate([local for _, local in parts])).T
+    columns = np.tile(parts[0][0][:, None] + np.arange(degree + 1), (4, 1)).ravel()
+    return _Alive(weights, columns, _sparse(weights, columns, n))
+
+
+def _sparse(weights: Array, columns: npt.NDArray[np.intp], n: int) -> Any:
+    from scipy.sparse import csr_array
+
+    width, count = weights.shape
+    rows = np.arange(0, weights.size + 1, width)
+    return csr_array((weights.T.ravel(), columns, rows), shape=(count, n))
 
 
 @lru_cache(maxsize=64)
@@ -55,19 +80,14 @@ def sampling_at(
     t_end = t_start + (n - degree) * spacing
     if len(times) // 8 * n <= dense:
         return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
-    from scipy.sparse import csr_array
-
-    segments: list[npt.NDArray[np.intp]] = []
+    found: list[_Alive] = []
 
     def alive(offsets: bytes) -> Array:
-        parts = [local_basis(np.frombuffer(offsets), n, degree, spacing, k) for k in range(4)]
-        segments.append(parts[0][0])
-        return np.concatenate([local for _, local in parts]).T
+        found.append(_alive(offsets, n, degree, spacing))
+        return found[0].weights
 
-    weights = hold_ends(times, t_start, t_end, alive).T
-    columns = np.tile(segments[0][:, None] + np.arange(degree + 1), (4, 1))
-    rows = np.arange(0, weights.size + 1, degree + 1)
-    return csr_array((weights.ravel(), columns.ravel(), rows), shape=(len(weights), n))
+    weights, known = hold_ends(times, t_start, t_end, alive), found[0]
+    return known.matrix if weights is known.weights else _sparse(weights, known.columns, n)
 
 
 @lru_cache(maxsize=64)

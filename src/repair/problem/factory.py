@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,7 @@ from repair.problem.passing import open_passings
 from repair.problem.problem import Afterwards, Maneuver, Passing, RepairProblem
 from repair.problem.settings import RepairConfig
 from repair.problem.shapes import Shapes
+from repair.problem.speeds import Bends, speed_profiles
 from repair.problem.surroundings import Surroundings, sides_of, surroundings
 from repair.problem.tables import Grid
 from repair.problem.taken import begun
@@ -70,6 +71,28 @@ def part_in_reach(
 
 
 @dataclass(frozen=True)
+class _Here:
+    """What is about at a t_rep, whatever the margin: the reference from there on, the state, who is in reach.
+
+    ``among`` says what the boxes with a margin are to the reference.
+    """
+
+    t_rep: float
+    reference: FrenetTrajectory
+    start: Array
+    occupancy: Occupancy
+    among: Callable[[float], Surroundings]
+    limits: Limits
+    axis: tuple[Array, Array]
+
+    @cached_property
+    def bends(self) -> Bends:
+        """How the speed may go on."""
+        tau = self.reference.t - self.reference.t[0]
+        return Bends(speed_profiles(self.start, tau, self.limits), self.limits, self.axis)
+
+
+@dataclass(frozen=True)
 class ProblemFactory:
     """Makes the repair problems of one scene and reference (a :class:`repair.search.probe.ProblemSource`).
 
@@ -116,6 +139,10 @@ class ProblemFactory:
         return Grid.over(self.occupancy, self.reference, self.t_end, self.scene.dt)
 
     @cached_property
+    def _last(self) -> dict[str, _Here]:
+        return {}
+
+    @cached_property
     def _axis(self) -> tuple[Array, Array]:
         s0 = float(self.scene.start[0, 0])
         s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
@@ -159,18 +186,16 @@ class ProblemFactory:
         step = self.scene.dt
         if t_rep > self.t_end - step + INSTANT:
             return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
-        count = intervals(self.t_end - t_rep, step)
-        times = t_rep + step * np.arange(count + 1)
-        reference, start, occupancy, boxes = self._scenery(t_rep, times, margin, lateral)
-        s, curvature = self._axis
+        here = self._here(t_rep)
         passings = open_passings(
-            reference, start, occupancy, self.bounds, self.limits, margin, lateral, (s, curvature), boxes
-        )
+            here.reference, here.start, here.occupancy, self.bounds, self.limits, margin, lateral, self._axis,
+            here.among(margin), here.bends,
+        )  # fmt: skip
         # Who keeps the path needs no sideways freedom, and without it the vehicle can be brought to a stop
         # on any path that it can drive at all.
         return tuple(
             self._problem(
-                t_rep, start, occupancy, margin, passing,
+                t_rep, here.start, here.occupancy, margin, passing,
                 lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
             )
             for passing in passings
@@ -178,13 +203,11 @@ class ProblemFactory:
 
     def without_guide(self, t_rep: float) -> tuple[RepairProblem, ...]:
         """One problem with all the room there is, and no way past the obstacles chosen."""
-        settings, step = self.settings, self.scene.dt
-        if t_rep > self.t_end - step + INSTANT:
+        settings = self.settings
+        if t_rep > self.t_end - self.scene.dt + INSTANT:
             return ()
-        times = t_rep + step * np.arange(intervals(self.t_end - t_rep, step) + 1)
-        lateral = settings.lateral != "none"
-        _, start, occupancy, _ = self._scenery(t_rep, times, settings.margin, lateral)
-        return (self._problem(t_rep, start, occupancy, settings.margin, None, lateral),)
+        here, lateral = self._here(t_rep), settings.lateral != "none"
+        return (self._problem(t_rep, here.start, here.occupancy, settings.margin, None, lateral),)
 
     def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
         """The problem at the start of a manoeuvre, with the manoeuvre as the guide, open or not.
@@ -245,22 +268,29 @@ class ProblemFactory:
             afterwards=self.afterwards,
         )
 
-    def _scenery(
-        self, t_rep: float, times: Array, margin: float, lateral: bool
-    ) -> tuple[FrenetTrajectory, Array, Occupancy, Surroundings]:
-        """Reference, state at t_rep, obstacles within reach, and where these meet the reference."""
-        grid = self._grid
+    def _here(self, t_rep: float) -> _Here:
+        """What is about at t_rep; the last answer is kept, as margins are asked for one after the other."""
+        known = self._last.get("here")
+        if known is None or known.t_rep != t_rep:
+            known = self._last["here"] = self._scenery(t_rep)
+        return known
+
+    def _scenery(self, t_rep: float) -> _Here:
+        grid, lateral, step = self._grid, self.settings.lateral != "none", self.scene.dt
+        times = t_rep + step * np.arange(intervals(self.t_end - t_rep, step) + 1)
         first = None if grid is None else grid.index(t_rep)
         if grid is None or first is None:
             reference = self.reference.sample(times)
             start = frozen([reference.position[0], reference.velocity[0], reference.acceleration[0]])
             occupancy = self._within_reach(start, t_rep, reference.position, lateral)
-            return reference, start, occupancy, surroundings(reference, occupancy, margin)
-        reference, start = grid.trajectory(first, times), grid.states[first]
-        reach, room = self._reach(start, t_rep, grid.rightmost[first], grid.leftmost[first], lateral)
-        rows = near(grid.swept[..., first:], reach, room).nonzero()[0]
-        occupancy = grid.occupancy.select(rows) if len(rows) < len(grid.occupancy) else grid.occupancy
-        return reference, start, occupancy, grid.surroundings(first, rows, occupancy, margin)
+            among = partial(surroundings, reference, occupancy)
+        else:
+            reference, start = grid.trajectory(first, times), grid.states[first]
+            reach, room = self._reach(start, t_rep, grid.rightmost[first], grid.leftmost[first], lateral)
+            rows = near(grid.swept[..., first:], reach, room).nonzero()[0]
+            occupancy = grid.occupancy.select(rows) if len(rows) < len(grid.occupancy) else grid.occupancy
+            among = partial(grid.surroundings, first, rows, occupancy)
+        return _Here(t_rep, reference, start, occupancy, among, self.limits, self._axis)
 
     def _within_reach(self, start: Array, t_rep: float, reference: Array, lateral: bool) -> Occupancy:
         sideways = reference[:, 1]

@@ -42,6 +42,7 @@ def open_passings(
     lateral: bool,
     curvature: tuple[Array, Array],
     boxes: Surroundings | None = None,
+    bends: Bends | None = None,
 ) -> tuple[Passing, ...]:
     """The open ways past the obstacles, the gentlest of each manoeuvre, cheapest first.
 
@@ -64,6 +65,8 @@ def open_passings(
     boxes : Surroundings, optional
         What :func:`repair.problem.surroundings.surroundings` says of the reference, the obstacles and
         the margin, if it is known.
+    bends : Bends, optional
+        The speed profiles from the state on and what the path's bends leave of them, likewise.
 
     Returns
     -------
@@ -75,8 +78,8 @@ def open_passings(
     tau = reference.t - reference.t[0]
     boxes = boxes or surroundings(reference, occupancy, margin)
     profiles = lateral_profiles(start, tau, reference, boxes, limits, bounds, margin + 0.05, lateral)
-    speeds = speed_profiles(start, tau, limits)
-    bends = Bends(speeds, limits, curvature)
+    bends = bends or Bends(speed_profiles(start, tau, limits), limits, curvature)
+    speeds = bends.speeds
     overlaps = [boxes.overlap]
     if len(profiles) > 1:
         edges = widened(boxes.lower, boxes.upper, margin)[1]

@@ -157,7 +157,8 @@ def given_start(thing: Any, scene: Scene) -> InitialState:
     if hasattr(thing, "state_list"):
         table = _table_of_states(_states_of(thing, None, scene), scene.dt)
     else:
-        table = _rounded(table_of(thing))  # as result.json has it: who runs that again follows the same
+        table = np.array(table_of(thing))  # as result.json has it: who runs that again follows the same
+        table[:, 0], table[:3] = _rounded(table[:, 0]), _rounded(table[:3])
     require_times(table[:, 0], scene.dt)
     (_, x, y, yaw, v), after = table[0], table[1]
     moved = np.array([after[1] - x, after[2] - y])

@@ -226,6 +226,22 @@ class FrenetFrame:
 
     def _project(self, flat: Array, hint: Array | None) -> Array:
         start = self._nearest(flat, hint)
+        s, lateral, along, width = self.settled(flat, start)
+        # Newton may run away from the nearest sample only along the straight extensions
+        strayed = (np.abs(np.clip(s, 0.0, self.length) - start) > 1.0) & (width < 0.5)
+        outside = (width <= _DOMAIN) | (np.abs(lateral) > self.max_lateral) | (along > 1e-7) | strayed
+        found = np.stack([s, lateral], axis=1)
+        found[outside] = np.nan
+        return found
+
+    def settled(self, flat: Array, start: Array) -> tuple[Array, Array, Array, Array]:
+        """Newton's method for points (N, 2) from arc lengths (N,) on, wherever that leads.
+
+        Returns
+        -------
+        s, l, along, width : (N,) array
+            Where it ended, how far from a projection that is [m], and ``1 - curvature * l``.
+        """
         px, py = np.ascontiguousarray(flat.T)
         s = start
         for _ in range(_NEWTON):
@@ -234,7 +250,7 @@ class FrenetFrame:
             slope = gx * x2 + gy * y2 - x1 * x1 - y1 * y1  # -(1 - kappa l)
             step = (gx * x1 + gy * y1) / np.minimum(slope, -_DOMAIN)
             s = s - step
-            if np.max(np.abs(step)) < 1e-11:
+            if np.abs(step).max(initial=0.0) < 1e-11:
                 break
         (x, y), (x1, y1), (x2, y2) = self._derivatives(s, 2)
         gx, gy = px - x, py - y
@@ -242,13 +258,7 @@ class FrenetFrame:
         norm = np.sqrt(square)
         lateral = (x1 * gy - y1 * gx) / norm
         along = np.abs(gx * x1 + gy * y1) / norm
-        width = 1.0 - (gx * x2 + gy * y2) / square
-        # Newton may run away from the nearest sample only along the straight extensions
-        strayed = (np.abs(np.clip(s, 0.0, self.length) - start) > 1.0) & (width < 0.5)
-        outside = (width <= _DOMAIN) | (np.abs(lateral) > self.max_lateral) | (along > 1e-7) | strayed
-        found = np.stack([s, lateral], axis=1)
-        found[outside] = np.nan
-        return found
+        return s, lateral, along, 1.0 - (gx * x2 + gy * y2) / square
 
     # ------------------------------------------------------------------ trajectories
 

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen, names
 from repair.curves.base import FrenetTrajectory
-from repair.scene.road.passes import every_pass
+from repair.scene.road.beside import to_frenet_from
+from repair.scene.road.passes import every_pass, passes
 from repair.timegrid import INSTANT
 from repair.world.boxes import Occupancy
 
@@ -97,7 +98,7 @@ def build_occupancy(
     notes: list[str] = []
     inflate = np.array([s_offset, l_offset])
     seen = [np.zeros(len(one.steps), dtype=np.bool_) for one in looked]
-    for turn, boxes in enumerate(_boxes(looked, frame, inflate)):
+    for turn, boxes in enumerate(_boxes(looked, frame, inflate, often=within is not None)):
         for j, (one, (low, high, whole)) in enumerate(zip(looked, boxes, strict=True)):
             seen[j] |= whole
             if turn == 0:
@@ -162,7 +163,10 @@ def _near_by(
     ways = np.full(steps, -np.inf)
     ways[: len(within.ways)] = within.ways[:steps]
     i, j = np.nonzero(np.abs(centre - complex(*frame.position(within.start))) <= ways + away)
-    close = np.abs(centre[i, j][:, None] - path).min(axis=1, initial=np.inf) <= away[i, j]
+    apart = centre[i, j][:, None] - path
+    square = apart.real**2
+    square += apart.imag**2
+    close = square.min(axis=1) <= away[i, j] ** 2
     near = np.zeros((len(rows), steps + 2), dtype=np.bool_)
     for shift in (0, 1, 2):
         near[i[close], j[close] + shift] = True
@@ -188,8 +192,13 @@ def _box(points: Array, inflate: Array) -> tuple[Array, Array, npt.NDArray[np.bo
     return lower, upper, whole
 
 
-def _boxes(looked: Sequence[_Looked], frame: FrenetFrame, inflate: Array) -> Iterator[list[_Box]]:
-    """:func:`_box` of each, for each pass of the frame; outlines of as many points all at once."""
+def _boxes(
+    looked: Sequence[_Looked], frame: FrenetFrame, inflate: Array, often: bool
+) -> Iterator[list[_Box]]:
+    """:func:`_box` of each, for each pass of the frame; outlines of as many points all at once.
+
+    Where it is done ``often`` in one frame, outlines are projected from their middles on.
+    """
     alike: dict[int, list[int]] = {}
     for j, one in enumerate(looked):
         alike.setdefault(one.outline.shape[1], []).append(j)
@@ -197,7 +206,14 @@ def _boxes(looked: Sequence[_Looked], frame: FrenetFrame, inflate: Array) -> Ite
     if not order:
         return
     stacked = np.concatenate([looked[j].outline.reshape(-1, 2) for j in order])
-    for found in every_pass(frame, stacked):
+    if often and len(passes(frame)) == 1:
+        middles = [looked[j].outline.mean(axis=1) for j in order]
+        at = frame.to_frenet(np.concatenate(middles))[:, 0]
+        points = np.repeat([looked[j].outline.shape[1] for j in order], [len(one) for one in middles])
+        projected = [to_frenet_from(frame, stacked, at.repeat(points))]
+    else:
+        projected = every_pass(frame, stacked)
+    for found in projected:
         made, begin = [_NO_BOX] * len(looked), 0
         for width, rows in alike.items():
             steps = [len(looked[j].steps) for j in rows]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from copy import copy
 from functools import cached_property, lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,8 +36,23 @@ _MOST = 32
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
 
-def _beyond(region: Any, sections: Any) -> Any:
-    """What of a region is in no section, prepared for questions; None where that is rounding."""
+class _Gaps(NamedTuple):
+    """What is road and in no section: prepared for questions, and the boxes (N, 4) around its parts."""
+
+    region: Any
+    boxes: Array
+
+    def close(self, x: Array, y: Array, radius: float) -> npt.NDArray[np.intp]:
+        """Which of circles around places (K,) reach one of the boxes."""
+        low, high = self.boxes[:, :2] - radius, self.boxes[:, 2:] + radius
+        some = (low <= (x.max(), y.max())).all(axis=1) & (high >= (x.min(), y.min())).all(axis=1)
+        (left, below), (right, above) = low[some].T, high[some].T
+        x, y = x[:, None], y[:, None]
+        return np.flatnonzero(((left <= x) & (x <= right) & (below <= y) & (y <= above)).any(axis=1))
+
+
+def _beyond(region: Any, sections: Any) -> _Gaps | None:
+    """What of a region is in no section; None where that is rounding."""
     import shapely
 
     parts = shapely.get_parts(shapely.difference(region, sections))
@@ -46,7 +61,7 @@ def _beyond(region: Any, sections: Any) -> Any:
         return None
     gaps = shapely.union_all(parts)
     shapely.prepare(gaps)
-    return gaps
+    return _Gaps(gaps, shapely.bounds(parts))
 
 
 class RoadBoundary:
@@ -79,7 +94,7 @@ class RoadBoundary:
         import shapely
 
         self._scenario = scenario
-        self._corners = vehicle.corners
+        self._corners, self._radius = vehicle.corners, 1.001 * vehicle.radius
         self.region = shapely.union_all(outlines(scenario.lanelet_network))
         self._drawn = self.region
         if gap > 0.0:
@@ -98,15 +113,17 @@ class RoadBoundary:
         tuple or None
             Its index, where and how much of it in words, and the place [m].
         """
-        if self._gaps is None or not len(x):
+        gaps = self._gaps
+        close = np.empty(0, dtype=np.intp) if gaps is None or not len(x) else gaps.close(x, y, self._radius)
+        if gaps is None or not len(close):
             return None
         import shapely
 
-        bodies = shapely.polygons(self.outline(x, y, orientation))
+        bodies = shapely.polygons(self.outline(x[close], y[close], orientation[close]))
         with _PREPARED:
-            near = np.flatnonzero(shapely.intersects(self._gaps, bodies))
-        for index in near.tolist():
-            part = shapely.intersection(bodies[index], self._gaps)
+            near = np.flatnonzero(shapely.intersects(gaps.region, bodies))
+        for index, body in zip(close[near].tolist(), bodies[near], strict=True):
+            part = shapely.intersection(body, gaps.region)
             if (area := float(shapely.area(part))) > _SLIVER:
                 at = shapely.centroid(part)
                 words = (
@@ -118,7 +135,7 @@ class RoadBoundary:
         return None
 
     @cached_property
-    def _gaps(self) -> Any:
+    def _gaps(self) -> _Gaps | None:
         """What is road here and none for the drivability checker, which has the sections alone; or None."""
         import shapely
 
@@ -130,7 +147,7 @@ class RoadBoundary:
         import shapely
 
         wider, gaps = copy(self), self._gaps
-        sections = self.region if gaps is None else shapely.difference(self.region, gaps)
+        sections = self.region if gaps is None else shapely.difference(self.region, gaps.region)
         wider.region = shapely.buffer(self.region, by)
         shapely.prepare(wider.region)
         wider._gaps = None if gaps is None else _beyond(wider.region, shapely.buffer(sections, by))

@@ -98,13 +98,11 @@ def feasibility_bounds(
     tuple of SoftBounds
         Of (3n - 6, axes) quantities each, not flattened.
     """
-    rows = [n - 1, n - 2, n - 3]
-    extremes = np.repeat(np.stack((maxima, -minima)), rows, axis=1)
+    extremes = np.array((maxima, -minima))
     limit, joint = elastic * extremes, (joint_factor - elastic) * np.abs(extremes)
     weight = np.empty_like(joint)
-    weight[:] = np.repeat(weights, rows)[:, None]
-    limit[1, : n - 1, 0] = 0.0
-    joint[1, : n - 1, 0] = REVERSE_JOINT
-    weight[1, : n - 1, 0] = reverse_weight
-    above, below = (SoftBounds.of(limit[k], joint[k], weight[k]) for k in (0, 1))
-    return above, below
+    weight[:] = np.reshape(weights, (3, 1))
+    limit[1, 0, 0], joint[1, 0, 0], weight[1, 0, 0] = 0.0, REVERSE_JOINT, reverse_weight
+    # All quantities of an order alike.
+    each = np.array(SoftBounds.of(limit, joint, weight)).repeat((n - 1, n - 2, n - 3), axis=2)
+    return SoftBounds(*each[:, 0]), SoftBounds(*each[:, 1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -66,6 +66,7 @@ class Stages:
         self.minimise = minimiser(config) if minimise is None else minimise
         c = config
         self._penalties = (c.w_v, c.w_a, c.w_j, c.elastic, c.joint, c.reverse)
+        self._rest: tuple[Array, tuple[Any, ...], float] | None = None
 
     def deform(self, problem: RepairProblem, initial: UniformBSpline, deadline: float | None) -> Deformed:
         """Minimise J; while control points still collide, double lambda_c and start again.
@@ -190,9 +191,13 @@ class Stages:
         """What l costs where it may not move: a constant."""
         if problem.lateral or not np.count_nonzero(points[:, 1]):
             return 0.0
-        n = len(points)
-        bounds = feasibility(n, problem.limits, self._penalties, weights.feasible, (1,))
-        return resting_cost(points[:, 1:], spacing, weights.smooth, bounds, self.sizes)
+        key = problem.limits, spacing, weights.smooth, weights.feasible
+        known = self._rest  # a search asks for the same again and again
+        if known is None or known[1] != key or not np.array_equal(known[0], points[:, 1]):
+            bounds = feasibility(len(points), problem.limits, self._penalties, weights.feasible, (1,))
+            cost = resting_cost(points[:, 1:], spacing, weights.smooth, bounds, self.sizes)
+            known = self._rest = points[:, 1].copy(), key, cost
+        return known[2]
 
     def _whole(
         self, cost: SplineCost, start: Array, deadline: float | None, near_closed_form: bool = False
