@@ -29,7 +29,9 @@ from repair.config import load_config
 from repair.errors import RepairError
 from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
+from repair.scene.scene import Scene
 from repair.solvers.registry import make_backend
+from repair.timegrid import INSTANT
 
 COARSE, FINE = 0.1, 0.01  # [s]
 # The backend's name, then what it is told.
@@ -44,16 +46,13 @@ WAYS = {
 MEASURED = ("ego", "qptr", "casadi", "ipopt")
 
 
-def prepared(file: Any, reference: str, way: str, *keys: str) -> Any:
-    """Something to search, with its backend; None where there is no conflict that can be avoided.
-
-    ``file`` is a path, or its scene.
-    """
+def prepared(scene: Scene, reference: str, way: str, *keys: str) -> Any:
+    """Something to search, with its backend; None where there is no conflict that can be avoided."""
     backend, *told = WAYS[way]
     overrides = [f"reference.source={reference}", "fallback=[]", *told, *keys]
     config = load_config(backend=backend, overrides=overrides)
     try:
-        made = prepare(load_scene(file, config) if isinstance(file, Path) else file, config)
+        made = prepare(scene, config)
     except RepairError:
         return None
     if not np.isfinite(made.conflict.time) or made.conflict.contact_time <= 0.0:
@@ -78,24 +77,30 @@ def seconds(made: Any) -> float:
     return time.process_time() - begin
 
 
-def finer(files: list[Path], backends: list[str]) -> None:
+def finer(files: list[Path], ways: list[str]) -> None:
     """Print by how much longer searches take at the finer step."""
-    for backend in backends:
-        ratios = []
-        with tempfile.TemporaryDirectory(prefix="repair-steps-") as folder:
-            for file in files:
-                fine = resampled(file, FINE, Path(folder))
-                pair = [prepared(f, "constant", backend) for f in (file, fine)]
-                if None in pair or abs(pair[0][0].scene.dt - COARSE) > 1e-9:
+    ratios: dict[str, list[float]] = {way: [] for way in ways}
+    with tempfile.TemporaryDirectory(prefix="repair-steps-") as folder:
+        for file in files:
+            try:
+                scenes = [load_scene(f) for f in (file, resampled(file, FINE, Path(folder)))]
+            except RepairError:
+                continue
+            if abs(scenes[0].dt - COARSE) > INSTANT:
+                continue
+            for way in ways:
+                pair = [prepared(scene, "constant", way) for scene in scenes]
+                if None in pair:
                     continue
                 coarse, took = (seconds(made) for made in pair)
-                ratios.append(took / coarse)
-                print(f"  {backend} {file.name}: {1e3 * coarse:.1f} ms, {1e3 * took:.1f} ms", flush=True)
-        if ratios:
-            p50, p95 = np.percentile(ratios, (50, 95))
+                ratios[way].append(took / coarse)
+                print(f"  {way} {file.name}: {1e3 * coarse:.1f} ms, {1e3 * took:.1f} ms", flush=True)
+    for way, found in ratios.items():
+        if found:
+            p50, p95 = np.percentile(found, (50, 95))
             print(
-                f"{backend}: {len(ratios)} searches, at {FINE} s {p50:.1f} times as long as at {COARSE} s in "
-                f"the median, {p95:.1f} at the 95th percentile, {max(ratios):.1f} at most"
+                f"{way}: {len(found)} searches, at {FINE} s {p50:.1f} times as long as at {COARSE} s in "
+                f"the median, {p95:.1f} at the 95th percentile, {max(found):.1f} at most"
             )
 
 
