@@ -165,20 +165,22 @@ def _lost(driven: Driven) -> Array:
 
 def looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tuple[Array, Array, Array, Array]:
     """s, l, chi and beta (N, T fine) within and at the end of the steps: cubics and lines."""
-    x = np.arange(1, fine + 1) / fine
     s, l, v, chi, beta = driven[:5]  # noqa: E741
     along = v * np.cos(chi) / (1.0 - problem.curvature_at(s) * l)
-    found: list[Array] = []
-    for value, slope in ((s, along), (l, v * np.sin(chi))):
-        change = value[:, 1:, None] - value[:, :-1, None]
-        first, last = dt * slope[:, :-1, None], dt * slope[:, 1:, None]
-        bend = 3.0 * change - 2.0 * first - last
-        path = value[:, :-1, None] + x * (first + x * (bend + x * (first + last - 2.0 * change)))
-        found.append(path.reshape(len(value), -1))
-    for value in (chi, beta):
-        line = value[:, :-1, None] + x * (value[:, 1:, None] - value[:, :-1, None])
-        found.append(line.reshape(len(value), -1))
-    return found[0], found[1], found[2], found[3]
+    found = np.empty((4, len(s), s.shape[1] - 1, fine))
+    shares = [(k + 1) / fine for k in range(fine)]
+    for out, value, slope in ((found[0], s, along), (found[1], l, v * np.sin(chi))):
+        begin, change = value[:, :-1], np.diff(value)
+        first, last = dt * slope[:, :-1], dt * slope[:, 1:]
+        bend, rest = 3.0 * change - 2.0 * first - last, first + last - 2.0 * change
+        for k, x in enumerate(shares):
+            out[..., k] = begin + x * (first + x * (bend + x * rest))
+    for out, value in ((found[2], chi), (found[3], beta)):
+        change = np.diff(value)
+        for k, x in enumerate(shares):
+            out[..., k] = value[:, :-1] + x * change
+    s, l, chi, beta = found.reshape(4, len(s), -1)  # noqa: E741
+    return s, l, chi, beta
 
 
 def depths(centre: Points, heading: Array, boxes: Array, shapes: Shapes, room: Array) -> Array:
