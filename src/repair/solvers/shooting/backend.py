@@ -14,7 +14,7 @@ import time
 
 from repair.backend.base import Capabilities, Closest, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
-from repair.deadline import OutOfTime, in_time, until
+from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
 from repair.solvers.shooting.plans import ALONG, FREE
 from repair.solvers.shooting.settings import ShootingConfig
@@ -46,6 +46,8 @@ class ShootingBackend:
     ) -> SolveResult:
         """Along the path of the reference first, and then anywhere, where the problem allows it.
 
+        The manoeuvres that either search begins with are looked at before anything is drawn around them.
+
         Raises
         ------
         repair.errors.BackendError
@@ -57,17 +59,15 @@ class ShootingBackend:
         closest: Closest | None = None
         try:
             with until(None if time_limit is None else begin + time_limit):
-                for plan in (ALONG, FREE) if problem.lateral else (ALONG,):
-                    in_time()
-                    shot = task.search(plan)
-                    curve = task.curve(plan, shot)
+                plans = (ALONG, FREE) if problem.lateral else (ALONG,)
+                for plan, shot in task.shots(plans):
                     if shot.miss <= 0.0:
                         return SolveResult(
-                            SolveStatus.SOLVED, curve, shot.cost, task.iterations, built - begin,
-                            time.perf_counter() - built, residuals={"excess": shot.miss},
+                            SolveStatus.SOLVED, task.curve(plan, shot), shot.cost, task.iterations,
+                            built - begin, time.perf_counter() - built, residuals={"excess": shot.miss},
                         )  # fmt: skip
                     if closest is None or shot.miss < closest.miss:
-                        closest = Closest(curve, shot.miss)
+                        closest = Closest(task.curve(plan, shot), shot.miss)
         except OutOfTime:
             return SolveResult(
                 SolveStatus.TIME_LIMIT, iterations=task.iterations, build_time=built - begin,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from repair.timegrid import SHORT
 from repair.vehicle.parameters import Vehicle, load_vehicle
 from repair.vehicle.single_track import body_angles
 
-__all__ = ["Shot", "Task"]
+__all__ = ["First", "Shot", "Task"]
 
 _COARSE, _FINE = 2, 8  # looks at a step: while searching, and before a trajectory counts as found
 _ON_MAP = 4  # looks at a step at the road itself
@@ -49,6 +50,14 @@ class Shot:
     row: Array
     cost: float
     miss: float
+
+
+class First(NamedTuple):
+    """The manoeuvres that a search begins with: rows (N, D), their costs (N,), and the best of them."""
+
+    rows: Array
+    cost: Array
+    best: Shot
 
 
 class Task:
@@ -108,15 +117,35 @@ class Task:
             return curve_along(self.problem, driven, self.exact)
         return curve_of(self.problem, driven, self.exact)
 
-    def search(self, plan: Plan) -> Shot:
+    def shots(self, plans: Iterable[Plan]) -> Iterator[tuple[Plan, Shot]]:
+        """The best of what each plan begins with, and then of what is drawn around that."""
+        begun: dict[Plan, First] = {}
+        for plan in plans:
+            in_time()
+            begun[plan] = self._first(plan)
+            yield plan, begun[plan].best
+        for plan, first in begun.items():
+            in_time()
+            yield plan, self.search(plan, first)
+
+    def _first(self, plan: Plan) -> First:
+        rows = first_freely() if plan.steers else first_along()
+        cost, deep, driven = self._cost(plan, rows)
+        return First(rows, cost, self._best(plan, rows, cost, deep, driven))
+
+    def search(self, plan: Plan, first: First | None = None) -> Shot:
         """The best that is found.
 
         The search ends with the first iteration that finds one without excess, and where iterations no longer
         come closer to one.
+
+        Parameters
+        ----------
+        plan : Plan
+        first : First, optional
+            Of the manoeuvres that it begins with, where they have been looked at.
         """
-        rows = first_freely() if plan.steers else first_along()
-        cost, deep, driven = self._cost(plan, rows)
-        best = self._best(plan, rows, cost, deep, driven)
+        rows, cost, best = first or self._first(plan)
         if best.miss <= 0.0 or not self.config.iterations:
             return best
         random = np.random.default_rng(self.config.seed)
