@@ -20,6 +20,7 @@ from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.problem.problem import Maneuver, Passing, Side
 from repair.solvers.ego.backend import EgoBackend
+from repair.solvers.ego.bounds import bend_speed, slowest_bend
 from repair.solvers.ego.cost_structure import SIZES, Sizes
 from repair.solvers.ego.minimise import Minimum, minimiser, newton
 from repair.solvers.ego.pairs import anchor_pairs
@@ -505,3 +506,27 @@ def test_without_smoothness_there_is_still_a_finite_curve(solver, weights):
     assert result.curve is not None
     assert np.isfinite(result.curve.points).all()
     assert np.isfinite(result.objective)
+
+
+def test_no_bend_is_slower_than_the_sharpest():
+    rng = np.random.default_rng(3)
+    s = np.linspace(0.0, 80.0, 30)
+    problem = replace(
+        make_problem(SIDES[0], lateral=False), curvature_s=s, curvature=0.1 * rng.uniform(-1.0, 0.4, 30)
+    )
+    points = np.column_stack([np.sort(rng.uniform(-10.0, 90.0, 200)), np.zeros(200)])
+    allowed = bend_speed(problem, points)
+    assert slowest_bend(problem) <= allowed.min() * (1.0 + 1e-12)
+    assert slowest_bend(problem) > 0.8 * allowed.min()
+
+
+def test_what_rests_is_charged_for_each_problem():
+    stages = EgoBackend(PLAIN).stages
+    for offset in (0.3, 0.5, 0.3):
+        points = np.column_stack([np.arange(12.0), offset * np.arange(12.0) ** 2])
+        for problem in (make_problem(SIDES[0], lateral=False), make_problem(SIDES[0], lateral=True)):
+            fresh = EgoBackend(PLAIN).stages
+            args = (problem, points, 0.4, PLAIN.deform)
+            assert stages._resting(*args) == fresh._resting(*args)
+            eased = replace(problem, limits=problem.limits.reserving(0.2))
+            assert stages._resting(eased, *args[1:]) == fresh._resting(eased, *args[1:])

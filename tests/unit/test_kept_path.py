@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests import roads
@@ -84,3 +86,15 @@ def test_boxes_are_those_of_the_whole_as_long_as_somebody_asks(scene):
     np.testing.assert_array_equal(made.upper[known], whole.upper[known])
     assert known[:, asked][:, -1].all()
     assert not known[:, -1].any()
+
+
+def test_a_plan_that_is_projected_already_is_the_same_reference(scene):
+    watch = repair.Repairer(scene, backend="ego")
+    for _ in range(2):  # the second one is in the frame of the first
+        prepared = watch.update(winding(scene), traffic=[wall(scene, 27.0)]).prepared
+    given = prepared.given
+    assert given.places is not None
+    made, fresh = (one.curve(prepared.scene) for one in (given, replace(given, places=None)))
+    np.testing.assert_array_equal(made.points, fresh.points)
+    elsewhere = replace(given, places=(None, given.places[1] + 5.0))  # of another frame
+    np.testing.assert_array_equal(elsewhere.curve(prepared.scene).points, fresh.points)

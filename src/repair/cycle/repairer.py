@@ -37,6 +37,7 @@ from repair.reference.given import GivenReference, given_reference
 from repair.scene.commonroad import moved_on
 from repair.scene.reframe import lanes_at, reframe
 from repair.scene.road.lanes import Lane
+from repair.scene.road.passes import passes
 from repair.scene.scene import Scene
 from repair.search.modes import ModeResult, each_mode
 from repair.search.result import SearchResult, SearchStatus
@@ -237,7 +238,7 @@ class Repairer:
             with phases("given"):
                 given = given_reference(reference, scene)
         before = self._framed
-        scene, checker = self._frame(scene, given, asked.rebuilt)
+        scene, given, checker = self._frame(scene, given, asked.rebuilt)
         # A frame is laid out once for many cycles, whatever the deadline, and so is the road's edge along it.
         with until(asked.at if self._framed is before else None):
             prepared = laid_out(scene, self.config, given, phases, like=checker, within_reach=True)
@@ -287,7 +288,9 @@ class Repairer:
             raise OutOfTime
         return replace(settings, time_limit=min(left, settings.time_limit or left))
 
-    def _frame(self, scene: Scene, given: GivenReference, rebuilt: list[str]) -> tuple[Scene, Checker | None]:
+    def _frame(
+        self, scene: Scene, given: GivenReference, rebuilt: list[str]
+    ) -> tuple[Scene, GivenReference, Checker | None]:
         """The scene in a frame along the plan: the kept one where the plan is on its path, else a new one."""
         positions = given.positions
         assert positions is not None
@@ -295,7 +298,9 @@ class Repairer:
         if kept is not None:
             places = kept.frame.to_frenet(positions)
             if fits(places, kept.frame.length, self._room):
-                return in_frame(kept, scene, places[0]), self._checker
+                if len(passes(kept.frame)) == 1:  # else where it is there depends on the way
+                    given = replace(given, places=(kept.frame, places))
+                return in_frame(kept, scene, places[0]), given, self._checker
             rebuilt.append("frame: the plan leaves the path of the last one")
         if not self._within(positions):
             self.scene = moved_on(self._first, scene.initial_state)
@@ -310,7 +315,7 @@ class Repairer:
         made = reframe(scene, positions, lanes=self._lanes)
         self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
         self._framed, self._kept = made, None
-        return made, self._checker
+        return made, given, self._checker
 
     def _within(self, positions: Array) -> bool:
         """Whether the plan ends near the road that is laid out, and not at its end."""

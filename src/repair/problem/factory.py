@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -161,17 +161,16 @@ class ProblemFactory:
         Their guides keep the larger margins, so that other ways may be the ones to take.
         """
         for more in self.settings.widen:
-            yield tuple(
-                replace(problem, clearance=problem.clearance + more)
-                for problem in self.at(t_rep, self.settings.margin + more)
-            )
+            yield self.at(t_rep, self.settings.margin + more, self.settings.clearance + more)
 
     @property
     def notches(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
         """By what a problem is tightened: ``repair.widen``, ``narrow`` and ``ease``."""
         return self.settings.widen, self.settings.narrow, self.settings.ease
 
-    def at(self, t_rep: float, margin: float | None = None) -> tuple[RepairProblem, ...]:
+    def at(
+        self, t_rep: float, margin: float | None = None, clearance: float | None = None
+    ) -> tuple[RepairProblem, ...]:
         """One problem for each open side of passing, the gentlest guide first.
 
         Parameters
@@ -179,12 +178,13 @@ class ProblemFactory:
         margin : float, optional
             Distance to the inflated boxes [m]; negative values allow into them. By default
             ``repair.margin``.
+        clearance : float, optional
+            What soft backends want beyond them [m]; by default ``repair.clearance``.
         """
         settings = self.settings
         margin = settings.margin if margin is None else margin
         lateral = settings.lateral != "none"
-        step = self.scene.dt
-        if t_rep > self.t_end - step + INSTANT:
+        if t_rep > self.t_end - self.scene.dt + INSTANT:
             return ()  # the repair would end before it begins (repair.horizon is shorter than the TTC)
         here = self._here(t_rep)
         passings = open_passings(
@@ -196,7 +196,7 @@ class ProblemFactory:
         return tuple(
             self._problem(
                 t_rep, here.start, here.occupancy, margin, passing,
-                lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT),
+                lateral and passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT), clearance,
             )
             for passing in passings
         )  # fmt: skip
@@ -244,7 +244,7 @@ class ProblemFactory:
 
     def _problem(
         self, t_rep: float, start: Array, occupancy: Occupancy, margin: float, passing: Passing | None,
-        lateral: bool,
+        lateral: bool, clearance: float | None = None,
     ) -> RepairProblem:  # fmt: skip
         s, curvature = self._axis
         return RepairProblem(
@@ -255,7 +255,7 @@ class ProblemFactory:
             occupancy=occupancy,
             bounds=self.bounds,
             limits=self.limits,
-            clearance=self.settings.clearance,
+            clearance=self.settings.clearance if clearance is None else clearance,
             margin=margin,
             passing=passing,
             curvature_s=s,

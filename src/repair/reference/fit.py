@@ -31,7 +31,9 @@ _DENSE = 0.5  # positions between the steps are at most this far apart [m]
 _PARTS = 4  # of a step, at whose ends a curve is looked at
 
 
-def fit_recording(scene: Scene, recording: Recording, *, noisy: bool = False) -> Curve:
+def fit_recording(
+    scene: Scene, recording: Recording, *, noisy: bool = False, coordinates: Array | None = None
+) -> Curve:
     """Curve through what was driven; it ends with the last state.
 
     Where the velocities are known, it goes through positions and velocities alike, cubic from step to step,
@@ -47,6 +49,8 @@ def fit_recording(scene: Scene, recording: Recording, *, noisy: bool = False) ->
         At the scenario's steps.
     noisy : bool
         The positions were measured: no knots are added to follow them more closely.
+    coordinates : (K, 2) array, optional
+        The positions in the scene's frame, where they are known.
 
     Raises
     ------
@@ -57,7 +61,8 @@ def fit_recording(scene: Scene, recording: Recording, *, noisy: bool = False) ->
     last = len(positions)
     if last < 4:
         raise ReferenceTrajectoryError(f"{what} is known for {last} steps only; a reference takes at least 4")
-    coordinates = along(scene.frame, positions, float(scene.start[0, 0]))
+    if coordinates is None:
+        coordinates = along(scene.frame, positions, float(scene.start[0, 0]))
     if not np.isfinite(coordinates).all():
         raise ReferenceTrajectoryError(
             f"{what} leaves the neighbourhood of the route and cannot be a reference"

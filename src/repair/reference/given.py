@@ -33,6 +33,7 @@ from repair.timegrid import steps_until
 
 if TYPE_CHECKING:
     from repair.reference.settings import ReferenceConfig
+    from repair.scene.frame import FrenetFrame
     from repair.scene.scene import Scene
     from repair.vehicle.parameters import Vehicle
     from repair.world.boxes import Occupancy
@@ -52,11 +53,14 @@ class GivenReference:
         In the scene's own frame.
     plain : dict
         As ``result.json`` holds it; :func:`given_reference` reads it again.
+    places : (frame, (K, 2) array) or None
+        The positions in a frame, where somebody has projected them already.
     """
 
     recording: Recording | None
     path: Curve | None
     plain: dict[str, Any]
+    places: tuple[FrenetFrame, Array] | None = None
 
     @property
     def positions(self) -> Array | None:
@@ -79,7 +83,8 @@ class GivenReference:
         if self.recording is None:
             assert self.path is not None
             return self.path
-        return fit_recording(scene, self.recording)
+        frame, places = self.places or (None, None)
+        return fit_recording(scene, self.recording, coordinates=places if frame is scene.frame else None)
 
 
 def given_reference(thing: Any, scene: Scene) -> GivenReference:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, largest, smallest
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.solvers.ego.pairs import Pairs
 from repair.solvers.ego.penalties import SoftBounds, feasibility_bounds
 
-__all__ = ["bend_speed", "feasibility", "with_pairs"]
+__all__ = ["bend_speed", "feasibility", "slowest_bend", "with_pairs"]
 _STRAIGHT = np.array(1e-9)  # curvature [1/m]
 
 
@@ -43,6 +44,12 @@ def with_pairs(bounds: SoftBounds, pairs: Pairs, collision: float) -> SoftBounds
         np.concatenate((bounds.sixfold, weight)),
         np.concatenate((bounds.bend, weight * pairs.threshold)),
     )
+
+
+def slowest_bend(problem: RepairProblem) -> float:
+    """What :func:`bend_speed` is at least, wherever the control points are."""
+    sharpest = max(largest(problem.curvature), -smallest(problem.curvature), _STRAIGHT.item())
+    return math.sqrt(0.8 * problem.limits.a_lat / sharpest)
 
 
 def bend_speed(problem: RepairProblem, points: Array) -> Array:

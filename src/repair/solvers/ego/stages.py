@@ -9,7 +9,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.curves.bspline import UniformBSpline
 from repair.problem.problem import RepairProblem
-from repair.solvers.ego.bounds import bend_speed, feasibility, with_pairs
+from repair.solvers.ego.bounds import bend_speed, feasibility, slowest_bend, with_pairs
 from repair.solvers.ego.cost_structure import SIZES, Sizes
 from repair.solvers.ego.fitting_term import fitting_band
 from repair.solvers.ego.minimise import Minimiser, Minimum, minimiser
@@ -93,8 +93,9 @@ class Stages:
         moved = pairs if problem.lateral else pairs.along(0)
         resting = self._resting(problem, initial.points, spacing, config.deform)
         led = shape
+        straight = slowest_bend(problem) >= config.elastic * problem.limits.v_max
         for rounds in range(1, config.rebounds + 2):
-            cap = self._cap(problem, led)
+            cap = None if straight else self._cap(problem, led)
             minimum = self._minimise_deformation(
                 problem, minimum.points, spacing, moved, collision, cap, resting, deadline
             )
