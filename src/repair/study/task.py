@@ -26,6 +26,7 @@ from repair.study.rows import (
 
 if TYPE_CHECKING:
     from repair.baselines.evasive.times import EvasiveResult
+    from repair.config.schema import Config
     from repair.preparation import Prepared
     from repair.scene.scene import Scene
 
@@ -77,12 +78,12 @@ class Kept:
 
     def situation(self, task: Task) -> tuple[Prepared, float]:
         """What is searched, made for this row's configuration, and how long the preparation took [s]."""
-        from repair.preparation import again_for, prepare, what_matters
+        from repair.preparation import prepare, what_matters
 
         key = _text(what_matters(task.config))
         if key in self.prepared:
             like, spent = self.prepared[key]
-            return again_for(like, task.config), spent
+            return _for_row(like, task.config), spent
         scene, _ = self.scene(task)
         begin = time.perf_counter()
         made = prepare(scene, task.config)
@@ -90,7 +91,7 @@ class Kept:
         while len(self.prepared) >= _PREPARED:
             self.prepared.pop(next(iter(self.prepared)))
         self.prepared[key] = made, spent
-        return again_for(made, task.config), spent
+        return _for_row(made, task.config), spent
 
     def evasive(self, task: Task, prepared: Prepared) -> tuple[EvasiveResult, float]:
         """The fixed evasive manoeuvres, and how long they took [s]."""
@@ -102,6 +103,16 @@ class Kept:
             begin = time.perf_counter()
             self.evaded[key] = evasive_ttr(prepared, task.config.evasive), time.perf_counter() - begin
         return self.evaded[key]
+
+
+def _for_row(prepared: Prepared, config: Config) -> Prepared:
+    """What is prepared, for one row; who judges ends after the search is the same for all of them."""
+    from repair.preparation import again_for
+
+    again = again_for(prepared, config)
+    if config.checker.terminal == "report":
+        vars(again)["ends"] = prepared.ends
+    return again
 
 
 def _prepared_by(task: Task) -> dict[str, Any]:
