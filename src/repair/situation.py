@@ -127,7 +127,8 @@ class Situation:
         if road is None or not self.settings.road_ends:
             return []
         start = float(scene.start[0, 0])
-        return dead_ends(road, scene.frame, scene.vehicle, scene.road, start, ahead)
+        corridor = None if self.checker.edge is None else self.checker.edge.corridor
+        return dead_ends(road, scene.frame, scene.vehicle, scene.road, start, ahead, corridor)
 
     @cached_property
     def ends(self) -> EndJudge:

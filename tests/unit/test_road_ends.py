@@ -9,7 +9,7 @@ import pytest
 
 import repair
 import roads
-from repair.world.dead_ends import ROAD_END
+from repair.world.dead_ends import ROAD_END, dead_ends
 
 AWAY = roads.car(11, roads.state(900.0, 900.0, v=0.0))
 NOSE = 2.149  # half the ego's length
@@ -118,3 +118,12 @@ def test_where_the_road_goes_on_there_is_no_end(tmp_path: Path) -> None:
     assert found.prepared.dead_ends == []
     assert ROAD_END not in found.prepared.source.occupancy.ids
     assert scene.road_end is None
+
+
+def test_the_corridor_settles_places_and_changes_no_end(tmp_path: Path) -> None:
+    scene = loaded(tmp_path, roads.strip(1, straight(-50.0, 50.0)), 12.0, 8.0)
+    checker = answer(scene, "ego").prepared.checker
+    asked = checker.road, scene.frame, scene.vehicle, scene.road, float(scene.start[0, 0]), 80.0
+    plain, quick = dead_ends(*asked), dead_ends(*asked, checker.edge.corridor)
+    assert len(plain) == 1
+    np.testing.assert_array_equal(quick, plain)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen, names
+from repair.arrays import Array, Points, frozen, names
 from repair.world.boxes import Occupancy
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from repair.scene.road.bounds import LateralBounds
     from repair.vehicle.parameters import Vehicle
     from repair.world.road import RoadBoundary
+    from repair.world.road_corridor import RoadCorridor
 
 __all__ = ["ROAD_END", "dead_ends", "with_boxes"]
 
@@ -39,8 +40,9 @@ _Inside = Callable[..., npt.NDArray[np.bool_]]
 
 
 def dead_ends(
-    road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle, room: LateralBounds, start: float, ahead: float
-) -> list[tuple[Array, Array]]:
+    road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle, room: LateralBounds, start: float, ahead: float,
+    corridor: RoadCorridor | None = None,
+) -> list[tuple[Array, Array]]:  # fmt: skip
     """The parts of the path on which the ego would be off the road.
 
     Parameters
@@ -54,6 +56,8 @@ def dead_ends(
         How far aside the ego may go.
     start, ahead : float
         From where on the path is looked at, and how far [m]. A part in which it starts is none.
+    corridor : RoadCorridor, optional
+        Of this road and frame: most places are on the road by that alone.
 
     Returns
     -------
@@ -62,16 +66,23 @@ def dead_ends(
         ego, along the path, is on the road, and as wide as the road is missing around the path.
     """
 
+    def poses(s: Array, l: Array) -> tuple[Points, Array]:  # noqa: E741
+        slip = np.arcsin(np.clip(vehicle.rear * frame.curvature(s), -0.9, 0.9))
+        centre = np.ascontiguousarray(frame.to_cartesian(s, l)).view(np.complex128)[:, 0]
+        return centre, frame.heading(s) - slip
+
     def inside(s: Array, l: Array, over: float = 0.0) -> npt.NDArray[np.bool_]:  # noqa: E741
         body = vehicle.corners - over * np.sign(vehicle.corners)
-        slip = np.arcsin(np.clip(vehicle.rear * frame.curvature(s), -0.9, 0.9))
-        turn = np.exp(1j * (frame.heading(s) - slip))
-        centre = np.ascontiguousarray(frame.to_cartesian(s, l)).view(np.complex128)
-        corners = centre + turn[:, None] * (body[:, 0] + 1j * body[:, 1])
+        centre, orientation = poses(s, l)
+        turn = np.exp(1j * orientation)
+        corners = centre[:, None] + turn[:, None] * (body[:, 0] + 1j * body[:, 1])
         return road.inside(np.stack([corners.real, corners.imag], axis=2))
 
     s = start + np.arange(0.0, ahead + _COARSE, _COARSE)
-    on = inside(s, np.zeros(len(s)), _OVER)
+    axis = np.zeros(len(s))
+    on = np.zeros(len(s), dtype=np.bool_) if corridor is None else corridor.holds(s, *poses(s, axis))
+    if not on.all():
+        on[~on] = inside(s[~on], axis[~on], _OVER)
     if on.all():
         return []
     change = np.flatnonzero(np.diff(on.astype(np.int8)))
