@@ -14,6 +14,7 @@ from repair.config.simulate import SimulateConfig
 from repair.errors import ConfigError, RepairError
 from repair.reference.profile import SpeedProfile
 from repair.report.loop.table import interval, summary, table_of
+from repair.scene.frame import FrenetFrame
 from repair.scene.road.lanes import Lane
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import rigid_outline
@@ -23,16 +24,18 @@ from repair.simulate.data import CycleRecord, Driven
 from repair.simulate.many.case import simulation_config
 from repair.simulate.many.run import Simulation, drives_in, tasks_of
 from repair.simulate.measures import SIMULATION, row_of
-from repair.simulate.near import anybody_near
+from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.policies.registry import POLICIES, make_policy
 from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
 from repair.simulate.watch import Found
+from repair.simulate.wide import boxes_around
 from repair.simulate.world import Beliefs, World, displaced, widened
 from repair.study.rows import strict
 from repair.study.store import Store
 from repair.study.task import packed
 from repair.vehicle.model import vehicle_model
 from repair.world.collision import CollisionWorld
+from repair.world.occupancy import build_occupancy
 
 DT = 0.1
 VEHICLE = vehicle_model(2).parameters
@@ -146,6 +149,40 @@ def test_everybody_is_widened_along_the_way_and_nobody_backs_up(error, v):
     assert (np.diff(behind) > -1e-9).all()
     assert (plain - behind <= 0.5 * error * t**2 + 1e-9).all()
     np.testing.assert_allclose(found[1].rectangles[:, :2], found[1].states[:, :2])
+
+
+@pytest.mark.parametrize("bend", [0.0, 1.0 / 80.0, -1.0 / 50.0])
+def test_boxes_are_moved_instead_of_being_projected_again(bend):
+    """On a straight road exactly; in a bend as the tangent has it: off by the square of the distance."""
+    angle = np.linspace(0.0, 200.0 * bend, 401) if bend else np.zeros(401)
+    way = np.cumsum(0.5 * np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)
+    frame = FrenetFrame.from_points(way)
+    cars = tuple(
+        body(straight(x, y, heading, v), name=k)
+        for k, (x, y, heading, v) in enumerate(
+            [(40.0, 0.5, 0.05, 8.0), (60.0, -20.0, 1.3, 6.0), (30.0, 3.0, 0.0, 0.0)]
+        )
+    )
+    error, sizes = 0.5, (2.6, 1.2)
+    found, _ = boxes_around(cars, error, frame, DT, *sizes)
+    each, _ = build_occupancy(widened(cars, error, DT), frame, DT, *sizes)
+    off = 0.5 * error * (np.arange(61) * DT) ** 2
+    room = 0.02 + 1.3 * abs(bend) * (off**2 + 12.0 * off)  # corners are up to 12 m from where the tangent is
+    assert found.ids.tolist() == each.ids.tolist() == [0, 1, 2, 0, 1, 0, 1]
+    for one, two in ((found.lower, each.lower), (found.upper, each.upper)):
+        assert np.isfinite(one).all()
+        assert (np.abs(one - two).max(axis=2) <= room).all()
+
+
+@given(seed=st.integers(0, 999))
+def test_who_is_within_reach_comes_near_the_path(seed):
+    rng = np.random.default_rng(seed)
+    path = np.cumsum(rng.normal(1.0, 1.0, (30, 2)), axis=0)
+    cars = [body(straight(*rng.uniform(-60.0, 90.0, 2), rng.uniform(0.0, 6.0), rng.uniform(0.0, 20.0)))
+            for _ in range(6)]  # fmt: skip
+    gaps = [np.hypot(*(one.states[:, None, :2] - path).T).min() for one in cars]
+    expected = [one for one, gap in zip(cars, gaps, strict=True) if gap <= 12.0 + np.hypot(2.2, 0.9)]
+    assert list(within_reach(cars, path)) == expected
 
 
 def test_who_is_displaced_is_ahead_or_behind_and_who_stands_stays():
@@ -302,6 +339,8 @@ def test_measures_by_hand():
         CycleRecord(0.4, "plan", 1.5, 0.9, 0.01), CycleRecord(0.5, "brake", 1.4, None, 0.04, False),
         CycleRecord(0.6, "repair", 1.4, None, 0.01), CycleRecord(0.7, "plan", inf, inf, 0.01),
     ]  # fmt: skip
+    cycles += [CycleRecord(0.8, "plan", 1.4, 0.5, 0.01, False), CycleRecord(0.9, "plan", 1.3, 0.8, 0.01)]
+    cycles += [CycleRecord(1.0, "plan", 1.2, 0.9, 0.01, False)]  # carried on, which is no jump
     speeds = np.concatenate([np.full(5, 10.0), 10.0 - 0.6 * np.arange(1, 6), np.full(10, 7.0)])
     row = row_of(driven(speeds, cycles, offset=0.0), driven(np.full(20, 10.0), distance=0.05), 0.1, 0.1)
     assert row["plan_contact_s"] is None
@@ -310,7 +349,7 @@ def test_measures_by_hand():
     assert row["peak_deceleration_mps2"] == pytest.approx(6.0)
     assert row["peak_jerk_mps3"] == pytest.approx(60.0)
     assert (row["pairs"], row["jumps"], row["dissolved"], row["lost"]) == (4, 1, 1, 1)
-    assert (row["cycles"], row["cut_short"], row["cycle_max_ms"]) == (8, 1, 40.0)
+    assert (row["cycles"], row["cut_short"], row["cycle_max_ms"]) == (11, 3, 40.0)
     aside = row_of(driven(np.full(21, 10.0), offset=2.0), driven(np.full(21, 10.0)), 0.1, 0.1)
     assert aside["deviation_ms"] == pytest.approx(4.0)
     assert not aside["plan_margin"]
@@ -355,12 +394,12 @@ def test_the_table_counts():
     assert "| lane | f_ttr | 5 | 1 of 2 | 1 (0) | 4 | 2 of 3 [0, " in text
     assert "lane: f_ttr acts for nothing 0.67" in text
     assert (
-        "lane, f_ttr: cycles p50 5.0, p95 5.0, p99 5.0, p99.9 5.0 ms of a period of 200 ms; who acts, in "
-        in text
+        "lane, f_ttr: cycles p50 5.0, p95 5.0, p99 5.0, p99.9 5.0 ms of processor time, a period of 200 ms; "
+        "who acts, in " in text
     )
     assert "jerk 9 m/s³, 1.5 m/s² aside, 6.0 m s off the plan; struck with 3.0 m/s in the median" in text
     faster = {**rows[0], "drive": {"cycles": [{"t": 0.1 * k, "ms": 5.0} for k in range(3)]}}
-    assert "of periods of 100 to 200 ms" in table_of([*rows, faster])
+    assert "time, periods of 100 to 200 ms" in table_of([*rows, faster])
 
 
 def simulation(tmp_path, **changed) -> Simulation:

@@ -55,6 +55,13 @@ class SimulateConfig:
         low=0.0,
         high=20.0,
     )
+    solves: int | None = setting(
+        3,
+        "after so many solves the search of a cycle is carried on in the next one, once there is a repair "
+        "that can be waited for; null: never",
+        low=1,
+        high=1000,
+    )
     deadline: float | None = setting(
         None, "the search of a cycle ends by then [s]; null: when it is done", low=1e-3, high=1e3
     )

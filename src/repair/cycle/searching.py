@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,8 @@ def searched(
     guess: float | None = None,
     *,
     thorough: bool = False,
+    above: float | None = None,
+    on_probe: Callable[[Probe], None] | None = None,
 ) -> SearchResult:
     """The F-TTR of a cycle.
 
@@ -40,13 +43,17 @@ def searched(
         A time-to-repair at which there is a verified repair [s]: later ones are searched for.
     guess : float, optional
         Where it was a cycle ago [s]; with a rule that takes feasibility to be contiguous the search begins
-        there.
+        there, by default at the one that follows ``kept``.
     thorough : bool
         Before nothing is said to be feasible, every point of the grid is tried, from the last one down: such
         rules look no further where what they begin with is not.
+    above : float, optional
+        From where on nothing was found [s]: with such a rule nothing is visited there.
+    on_probe : callable, optional
+        Called after every probe; one that raises :class:`repair.deadline.OutOfTime` ends the search.
     """
     begin = time.perf_counter()
-    found = _searched(prepared, backend, settings, kept, guess)
+    found = _searched(prepared, backend, settings, kept, guess, above, on_probe)
     nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
     if thorough and nothing and settings.rule in _CONTIGUOUS:
         return _the_rest(prepared, backend, settings, begin, found)
@@ -59,23 +66,28 @@ def _searched(
     settings: SearchConfig,
     kept: float | None,
     guess: float | None,
+    above: float | None,
+    on_probe: Callable[[Probe], None] | None,
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
     end = _end(prepared, settings)
     if settings.rule not in _CONTIGUOUS:
         guess = None
     if (kept is None and guess is None) or not np.isfinite(end) or end <= 0.0:
-        return find(prepared, backend, settings=settings)
+        return find(prepared, backend, settings=settings, on_probe=on_probe)
     begin = time.perf_counter()
     step = settings.delta_t
     known = -1 if kept is None else int(np.floor(kept / step + INSTANT))
-    first = int(np.floor((guess or 0.0) / step + INSTANT)) if kept is None else known + 1
-    order = around(first, known, intervals(end, step))
+    first = known + 1 if guess is None else int(np.floor(guess / step + INSTANT))
+    size = intervals(end, step)
+    if above is not None:
+        size = min(size, max(int(np.ceil(above / step - INSTANT)), known + 1))
+    order = around(first, known, size)
     probes: tuple[Probe, ...] = ()
     complete, k = True, next(order, None)
     while k is not None and complete:
         left = _left(settings, begin)
-        found = find(prepared, backend, settings=left, visits=(k * step,))
+        found = find(prepared, backend, settings=left, visits=(k * step,), on_probe=on_probe)
         probes += found.probes
         complete = found.complete
         try:

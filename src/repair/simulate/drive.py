@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,7 +60,7 @@ class _Drive:
 
     def cycle(self, eyes: Eyes) -> CycleRecord:
         """Ask the policy, and take what it says."""
-        eyes.spent, eyes.complete = 0.0, True
+        eyes.spent, eyes.complete, eyes.solves = 0.0, True, 0
         sight = eyes.sight(self.curve, self.ego, self.step, self.mode, planned=self.planned)
         ttc, f_ttr = float("inf"), None
         if self.mode == "plan":
@@ -166,7 +169,8 @@ def drive(grounds: Grounds, plan: Curve, policy: Policy) -> Driven:
     struck: Struck | None = None
     while struck is None and run.step < world.n_steps:
         if world.n_steps - run.step >= 3:
-            cycles.append(run.cycle(eyes))
+            with _uncollected():
+                cycles.append(run.cycle(eyes))
         first, steps = run.step, min(every, world.n_steps - run.step)
         run.go(steps)
         latest = run.poses[-1] if len(run.poses) == 1 else np.vstack([run.poses[-2][-1:], run.poses[-1]])
@@ -180,6 +184,18 @@ def drive(grounds: Grounds, plan: Curve, policy: Policy) -> Driven:
     planned = _poses(driven_along(scene, plan, np.arange(count) * (scene.dt / _PER_STEP), None))
     broken = struck is not None and run.mode == "repair" and struck.time < run.verified - scene.dt
     return Driven(scene.dt, _columns(poses, planned, scene.dt), tuple(cycles), struck, distance, broken)
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Leave Python's garbage for the time between two cycles: to look for it may take longer than a cycle."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _poses(states: DrivenStates) -> Array:

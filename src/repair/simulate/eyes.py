@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -16,9 +16,10 @@ from repair.check.verdict import Conflict
 from repair.config.schema import Config
 from repair.curves.base import Curve
 from repair.scene.scene import InitialState, Scene
-from repair.scene.traffic.obstacle import Traffic
+from repair.scene.traffic.obstacle import Obstacle, Traffic
 from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.watch import Found, Looked, Watch
+from repair.simulate.wide import boxes_around
 from repair.simulate.world import Beliefs, displaced, widened
 from repair.vehicle.states import DrivenStates
 
@@ -82,11 +83,14 @@ class Eyes:
         Processor time of what was asked since it was last set to zero [s].
     complete : bool
         Whether no search was cut short since it was last set.
+    solves : int
+        How many there were since they were last set to zero.
     """
 
     grounds: Grounds
     spent: float = 0.0
     complete: bool = True
+    solves: int = 0
 
     @cached_property
     def hard(self) -> Watch:
@@ -176,9 +180,12 @@ class Sight:
 
     def _traffic(self, error: float = 0.0) -> Traffic:
         grounds = self.eyes.grounds
-        beliefs, dt = grounds.beliefs, grounds.scene.dt
-        near = within_reach(beliefs.at(self.step), self._path)
-        return Traffic(widened(near, error, dt), beliefs.ahead(self.step))
+        return Traffic(widened(self._near, error, grounds.scene.dt), grounds.beliefs.ahead(self.step))
+
+    @cached_property
+    def _near(self) -> tuple[Obstacle, ...]:
+        """Who is believed to come near the way."""
+        return within_reach(self.eyes.grounds.beliefs.at(self.step), self._path)
 
     @cached_property
     def _path(self) -> Array:
@@ -213,8 +220,16 @@ class Sight:
     def gently(self, level: int) -> Found | None:
         """The F-TTR with a smaller friction limit, among everybody widened; None without a conflict."""
         grounds = self.eyes.grounds
-        watch, traffic = self.eyes.gentle[level], self._traffic(grounds.config.simulate.error)
-        looked = self.eyes.timed(lambda: watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now))
+        watch = self.eyes.gentle[level]
+
+        def look() -> Looked:
+            error = grounds.config.simulate.error
+            return watch.look(
+                self.curve, traffic=self._traffic(error), ego=self.ego, now=self.now,
+                boxes_of=partial(boxes_around, self._near, error),
+            )  # fmt: skip
+
+        looked = self.eyes.timed(look)
         if looked.conflict.time == float("inf"):
             return None
         return self._search(watch, looked, None)
@@ -229,9 +244,14 @@ class Sight:
 
     def _meets(self, error: float) -> bool:
         grounds, watch = self.eyes.grounds, self.eyes.hard
-        near = within_reach(grounds.beliefs.at(self.step), self._path)
-        traffic = Traffic(displaced(near, error, grounds.scene.dt), grounds.beliefs.ahead(self.step))
-        looked = self.eyes.timed(lambda: watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now))
+
+        def look() -> Looked:
+            traffic = Traffic(
+                displaced(self._near, error, grounds.scene.dt), grounds.beliefs.ahead(self.step)
+            )
+            return watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now)
+
+        looked = self.eyes.timed(look)
         return looked.conflict.contact_time < float("inf")
 
     def brakes(self, t: float) -> bool:
@@ -244,7 +264,13 @@ class Sight:
 
     def _search(self, watch: Watch, looked: Looked | None, visits: tuple[float, ...] | None) -> Found:
         assert looked is not None
-        limit = self.eyes.grounds.config.simulate.deadline
-        found = self.eyes.timed(lambda: watch.answer(looked, limit=limit, visits=visits, enough=self.period))
+        config = self.eyes.grounds.config.simulate
+        left = None if config.solves is None else max(config.solves - self.eyes.solves, 1)
+        found = self.eyes.timed(
+            lambda: watch.answer(
+                looked, limit=config.deadline, visits=visits, enough=self.period, solves=left
+            )
+        )
         self.eyes.complete &= found.complete
+        self.eyes.solves += found.solves
         return found

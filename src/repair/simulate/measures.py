@@ -106,11 +106,15 @@ def _flicker(driven: Driven, period: float) -> dict[str, int]:
     """How the F-TTR runs down while the plan is followed.
 
     A jump is more than a step of the grid off; dissolved is a conflict that is gone before its F-TTR is due,
-    lost one whose repair is gone before.
+    lost one whose repair is gone before. Where a search is carried on in the next cycle there is no F-TTR
+    yet, only a repair that can be waited for: such cycles make no pairs.
     """
     pairs = jumps = dissolved = lost = 0
     for one, two in zip(driven.cycles[:-1], driven.cycles[1:], strict=True):
         if one.mode != "plan" or one.f_ttr is None or one.f_ttr == float("inf"):
+            continue
+        waits = two.mode == "plan" and not two.complete
+        if two.ttc < float("inf") and (waits or not one.complete):
             continue
         pairs += 1
         if two.ttc == float("inf"):

@@ -17,6 +17,7 @@ _ASIDE = 12.0  # who stays farther from the path is met on no way around anybody
 
 def within_reach(obstacles: Iterable[Obstacle], path: Array) -> tuple[Obstacle, ...]:
     """Those who come near a path (P, 2) [m] at any time: nobody else is met on it, or on the way around."""
+    low, high, way = path.min(axis=0), path.max(axis=0), path[:, 0] + 1j * path[:, 1]
     kept = []
     for one in obstacles:
         there = one.states[np.isfinite(one.states[:, 0]), :2]
@@ -24,9 +25,9 @@ def within_reach(obstacles: Iterable[Obstacle], path: Array) -> tuple[Obstacle, 
             kept.append(one)
             continue
         outline = one.vertices[np.isfinite(one.vertices[:, 0, 0])][0]
-        radius = float(np.hypot(*(outline - there[0]).T).max())
-        gap = there[:, None] - path
-        if float(np.min(np.sum(gap * gap, axis=2))) <= (_ASIDE + radius) ** 2:
+        reach = _ASIDE + float(np.hypot(*(outline - there[0]).T).max())
+        beside = there[((there >= low - reach) & (there <= high + reach)).all(axis=1)]  # others are farther
+        if len(beside) and np.abs((beside[:, 0] + 1j * beside[:, 1])[:, None] - way).min() <= reach:
             kept.append(one)
     return tuple(kept)
 

@@ -21,8 +21,11 @@ from repair.cycle.searching import searched
 from repair.preparation import Phases, Prepared, laid_out
 from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
-from repair.search.result import SearchStatus
+from repair.search.result import Probe, SearchStatus
+from repair.search.rules import CONTIGUOUS
+from repair.simulate.carried import Carried, Stint, carried_from
 from repair.timegrid import INSTANT
+from repair.world.boxes import MakeBoxes
 
 __all__ = ["Found", "Looked", "Watch"]
 
@@ -64,6 +67,8 @@ class Found:
         The repair is one of an earlier cycle, checked again.
     complete : bool
         The search ran to its end.
+    solves : int
+        How many there were.
     """
 
     f_ttr: float | None
@@ -71,6 +76,7 @@ class Found:
     until: float
     kept: bool
     complete: bool
+    solves: int = 0
 
 
 class Watch(Repairer):
@@ -81,14 +87,29 @@ class Watch(Repairer):
     """
 
     _edged: Checker | None = None
+    _carried: Carried | None = None
+
+    def along(self, checker: Checker) -> Watch:
+        """Itself, with the road's edge as it is laid out already for a checker on the same road."""
+        self._edged = checker
+        return self
 
     def twin(self) -> Watch:
         """Another one for the same road, with what is laid out of it and nothing of what was found."""
         made = copy(self)
         made.reset()
+        made._edged, made._carried = self._edged, None
         return made
 
-    def look(self, curve: Curve, *, traffic: Traffic, ego: InitialState, now: float = 0.0) -> Looked:
+    def look(
+        self,
+        curve: Curve,
+        *,
+        traffic: Traffic,
+        ego: InitialState,
+        now: float = 0.0,
+        boxes_of: MakeBoxes | None = None,
+    ) -> Looked:
         """The conflict of a curve, without a search.
 
         Parameters
@@ -101,6 +122,8 @@ class Watch(Repairer):
             At the beginning of the curve.
         now : float
             [s] since the planning problem's start; a multiple of the scenario's step.
+        boxes_of : callable, optional
+            Makes the boxes of a search, instead of those of the traffic.
 
         Raises
         ------
@@ -115,8 +138,9 @@ class Watch(Repairer):
             first_heading=ego.orientation,
         )  # fmt: skip
         prepared = laid_out(
-            scene, self.config, None, Phases(), reference=curve, like=self._edged, within_reach=True
-        )
+            scene, self.config, None, Phases(), reference=curve, like=self._edged, within_reach=True,
+            boxes_of=boxes_of,
+        )  # fmt: skip
         self._edged = prepared.checker
         return Looked(now, prepared)
 
@@ -127,6 +151,7 @@ class Watch(Repairer):
         limit: float | None = None,
         visits: tuple[float, ...] | None = None,
         enough: float | None = None,
+        solves: int | None = None,
     ) -> Found:
         """The search among what was looked at.
 
@@ -140,35 +165,88 @@ class Watch(Repairer):
             at, nor is this one kept.
         enough : float, optional
             Where an earlier repair still holds and can be waited for so long [s], nothing is searched.
+        solves : int, optional
+            After so many the rest of the search is left for the next cycle, if there is a repair that can be
+            waited for: where none was found, it is looked for there, and then the search goes to its end.
         """
         prepared, settings, begin = looked.prepared, self.config.search, time.perf_counter()
         if limit is not None:
             settings = replace(settings, time_limit=min(limit, settings.time_limit or limit))
         if visits is not None:
             made = find(prepared, self._backend, settings=settings, visits=visits)
-            return _found(prepared, made.f_ttr, made.curve, False, made.complete)
-        last = self._kept
+            tried = sum(max(len(probe.tried), 1) for probe in made.probes)
+            return _found(prepared, made.f_ttr, made.curve, False, made.complete, tried)
+        last, carried, self._carried = self._kept, self._carried, None
         kept = None if last is None else verified_again(last, prepared, looked.now)
-        if kept is not None and enough is not None and kept[0] >= enough - INSTANT:
+        enough, latest = enough or 0.0, np.inf if enough is None else enough + INSTANT  # a cycle ago
+        on = None
+        if carried is not None and looked.now - carried.now <= latest and (last is None or kept is not None):
+            on = carried.seen_from(looked.now, None if kept is None else kept[0])
+        safe = kept is not None and kept[0] >= enough - INSTANT
+        if kept is not None and safe and on is None and latest < np.inf:
             return _found(prepared, *kept, True, True)
         if limit is not None:
             left = max(limit - (time.perf_counter() - begin), 1e-6)
             settings = replace(settings, time_limit=left)
-        guess = last.due(looked.now) if last is not None and kept is None else None
+        if on is not None:
+            known, guess, above = on
+        else:
+            known, guess, above = None if kept is None else kept[0], None, None
+            if last is not None and kept is None and last.due(looked.now) >= 0.0:
+                guess = last.due(looked.now)
+        stint = Stint(solves, enough, best=-np.inf if known is None else known)
         made = searched(
-            prepared, self._backend, settings, None if kept is None else kept[0],
-            guess if guess is not None and guess >= 0.0 else None,
+            prepared, self._backend, settings, known, guess, above=above,
+            on_probe=stint if settings.rule in CONTIGUOUS else None,
         )  # fmt: skip
-        if made.curve is not None and made.f_ttr is not None:
+        best, complete = known if made.f_ttr is None else made.f_ttr, made.complete
+        if not complete:
+            self._carried = self._left_of(looked, made.probes, stint.ended, (known, above))
+            complete = stint.ended and self._carried is None
+        if stint.ended and best is None and not safe:
+            if limit is not None:
+                settings = replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 1e-6))
+            stint = Stint(0, enough, needed=True, spent=stint.spent)
+            nearer, step = min(probe.t_rep for probe in made.probes), settings.delta_t
+            at = float(np.ceil(enough / step - INSTANT)) * step
+            if at < nearer - INSTANT:
+                made = find(prepared, self._backend, settings=settings, visits=(at,), on_probe=stint)
+            rest = None if self._carried is None else self._carried.seen_from(looked.now, None)
+            if made.curve is None and rest is not None:  # there is none to wait on: to its end, as it began
+                made = searched(
+                    prepared, self._backend, settings, None, rest[1], above=rest[2], on_probe=stint
+                )  # fmt: skip
+                self._carried, complete = None, made.complete
+                if stint.ended:
+                    self._carried = self._left_of(looked, made.probes, True, (None, rest[2]))
+                    complete = self._carried is None
+        later = made.f_ttr is not None and (kept is None or made.f_ttr > kept[0])
+        if made.curve is not None and made.f_ttr is not None and later:
             self._kept = KeptRepair(made.curve, made.f_ttr, looked.now, prepared.scene.frame)
-            return _found(prepared, made.f_ttr, made.curve, False, made.complete)
+            return _found(prepared, made.f_ttr, made.curve, False, complete, stint.spent)
         if kept is not None:
-            return _found(prepared, *kept, True, made.complete)
+            return _found(prepared, *kept, True, complete, stint.spent)
         if made.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
-        return _found(prepared, made.f_ttr, None, False, made.complete)
+        return _found(prepared, made.f_ttr, None, False, complete, stint.spent)
+
+    def _left_of(
+        self,
+        looked: Looked,
+        probes: tuple[Probe, ...],
+        ended: bool,
+        before: tuple[float | None, float | None],
+    ) -> Carried | None:
+        """What is left for the next cycle of a search that was cut short."""
+        settings = self.config.search
+        if not ended and probes and not probes[-1].feasible:
+            probes = probes[:-1]  # nobody knows what would have come of the one that ran out of time
+        end = looked.conflict.time if settings.upper is None else min(looked.conflict.time, settings.upper)
+        return carried_from(probes, looked.now, end, settings.delta_t, before)
 
 
-def _found(prepared: Prepared, f_ttr: float | None, part: Any, kept: bool, complete: bool) -> Found:
+def _found(
+    prepared: Prepared, f_ttr: float | None, part: Any, kept: bool, complete: bool, solves: int = 0
+) -> Found:
     curve = None if part is None or f_ttr is None else SplicedCurve(prepared.reference, part, f_ttr)
-    return Found(f_ttr, curve, prepared.t_end, kept, complete)
+    return Found(f_ttr, curve, prepared.t_end, kept, complete, solves)

@@ -132,7 +132,7 @@ def _of_period(times: Mapping[str, float]) -> str:
     if "period_max" not in times:
         return ""
     low, high = times["period_min"], times["period_max"]
-    return f" of a period of {low:g} ms" if low == high else f" of periods of {low:g} to {high:g} ms"
+    return f", a period of {low:g} ms" if low == high else f", periods of {low:g} to {high:g} ms"
 
 
 def table_of(rows: Sequence[Row]) -> str:
@@ -183,7 +183,7 @@ def _below(prediction: str, policy: str, own: Sequence[Row]) -> str:
     words = [
         f"{name} {value:.1f}" for name, value in times.items() if name.startswith("p") and name[1].isdigit()
     ]
-    text = f"{prediction}, {policy}: cycles {', '.join(words)} ms{_of_period(times)}"
+    text = f"{prediction}, {policy}: cycles {', '.join(words)} ms of processor time{_of_period(times)}"
     if s["pairs"]:
         text += (
             f"; of {s['pairs']} pairs of cycles the F-TTR jumps in {s['jumps']}, is lost before it is due in "

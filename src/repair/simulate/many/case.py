@@ -163,13 +163,14 @@ def plan_on(scene: Scene, config: Config) -> Plan:
     alone = among(prepared, ())
     end = min(alone.conflict.time, prepared.t_reference)
     gentle = tuple(
-        Watch(prepared.scene, _over(config, {"limits.a_total": float(a)})) for a in config.simulate.gentle
+        Watch(prepared.scene, _over(config, {"limits.a_total": float(a)})).along(prepared.checker)
+        for a in config.simulate.gentle
     )
     return Plan(
         config.reference.source,
         prepared,
         steps_until(end, scene.dt),
-        Watch(prepared.scene, config),
+        Watch(prepared.scene, config).along(prepared.checker),
         gentle,
     )
 

@@ -65,5 +65,7 @@ class Graded(AtFttr):
                 if sight.sure():
                     return repair_by(found)
                 break
+            if not found.complete:  # the deadline came before anybody knew
+                break
             self.level += 1
         return super().decide(sight)

@@ -1,0 +1,95 @@
+"""Searches that end after so many solves, and go on in the next cycle."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repair.deadline import OutOfTime
+from repair.search.rules import around
+from repair.simulate.carried import Stint, carried_from
+from repair.timegrid import INSTANT
+
+STEP = 0.1
+
+
+def probe(k: int, feasible: bool, sides: int = 1):
+    return SimpleNamespace(t_rep=k * STEP, feasible=feasible, tried=("left",) * sides)
+
+
+@pytest.mark.parametrize(
+    "probes, needed, ended",
+    [
+        ([probe(9, False), probe(8, False)], True, None),  # it is still to be found
+        ([probe(9, False), probe(8, False)], False, 2),
+        ([probe(9, False, sides=2)], False, 1),
+        ([probe(9, False), probe(1, True), probe(5, True)], False, 3),  # what is found first cannot wait
+        ([probe(5, True), probe(7, False)], True, 2),
+    ],
+)
+def test_a_stint_ends_where_a_repair_can_be_waited_for(probes, needed, ended):
+    stint = Stint(2, 0.2, needed)
+    for count, one in enumerate(probes, start=1):
+        if count == ended:
+            with pytest.raises(OutOfTime):
+                stint(one)
+            break
+        stint(one)
+    assert stint.ended is (ended is not None)
+    without = Stint(None, 0.2)
+    for one in probes:
+        without(one)
+    assert not without.ended
+
+
+def places_from(guess, known, above, size):
+    """As :func:`repair.cycle.searching.searched` visits them."""
+    known = -1 if known is None else round(known / STEP)
+    if above is not None:
+        size = min(size, max(int(np.ceil(above / STEP - INSTANT)), known + 1))
+    return around(int(np.floor(guess / STEP + INSTANT)), known, size)
+
+
+def visited(order, stint, feasible):
+    """What is visited of an order until its stint is over."""
+    found, k = [], next(order, None)
+    while k is not None:
+        found.append(probe(k, feasible(k)))
+        try:
+            stint(found[-1])
+            k = order.send(found[-1].feasible)
+        except (OutOfTime, StopIteration):
+            break
+    return found
+
+
+@given(last=st.integers(-1, 40), size=st.integers(1, 41), first=st.integers(0, 40), solves=st.integers(1, 4))
+def test_what_is_carried_on_ends_at_the_last_place_with_a_repair(last, size, first, solves):
+    """Cycle after cycle at the same time, by a rule that takes feasibility to be contiguous."""
+    on, best, end = (None, min(first, size - 1) * STEP, None), None, size * STEP
+    for _ in range(13):
+        known, guess, above = on
+        stint = Stint(solves, 0.0, best=-np.inf if known is None else known)
+        found = visited(places_from(guess, known, above, size), stint, lambda k: k <= last)
+        assert len(found) == solves or not stint.ended
+        best = max((one.t_rep for one in found if one.feasible), default=known)
+        carried = carried_from(found, 0.0, end, STEP, (known, above)) if stint.ended else None
+        on = None if carried is None else carried.seen_from(0.0, best)
+        if on is None:
+            break
+    assert on is None
+    assert (-1 if best is None else round(best / STEP)) == min(last, size - 1)
+
+
+def test_what_is_kept_meanwhile_does_not_end_a_search_from_above():
+    """Nothing at 0.9 and 0.8 s; the repair at 0.2 s is kept, and the next place is 0.6 s."""
+    carried = carried_from([probe(9, False), probe(8, False)], 1.0, 1.2, STEP)
+    assert carried.seen_from(1.0, 0.2) == (None, pytest.approx(0.6), pytest.approx(0.8))
+    assert carried.seen_from(1.2, 0.0) == (None, pytest.approx(0.4), pytest.approx(0.6))
+    assert carried.seen_from(1.2, 0.6) is None
+    found = carried_from([probe(6, False), probe(2, True)], 1.0, 1.2, STEP, (None, 0.8))
+    assert found.seen_from(1.0, 0.2) == (0.2, pytest.approx(0.4), pytest.approx(0.6))
