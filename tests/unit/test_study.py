@@ -25,12 +25,13 @@ from tests.breaking import breaking
 import repair
 from repair.cli import main
 from repair.errors import OutputError, RepairError
+from repair.progress import Progress, counted
 from repair.study.engine import LocalLanes, rows_of
 from repair.study.export import export
 from repair.study.plan import NO_MEMORY, Study, Variation, labels_of, tasks_of
 from repair.study.read import read_study
 from repair.study.rows import STUDY_COLUMNS, failed_row, strict, type_of, volatile
-from repair.study.run import Progress, estimate, run_study
+from repair.study.run import estimate, run_study
 from repair.study.store import STORE_FILE, Store
 from repair.study.task import Kept, row_of, unpacked
 from repair.study.worker import run_task
@@ -403,8 +404,10 @@ def test_a_dry_run_of_some_rows(folder, tmp_path, capsys, monkeypatch):
 def test_progress_where_nobody_watches(capsys):
     shown = Progress(10, 2)
     shown.told -= 60.0
-    shown.row("crash")
+    shown.one(broken=True)
     assert "3 of 10 rows, 1 could not be run" in capsys.readouterr().err
+    assert list(counted(iter("ab"), 2, "letters")) == ["a", "b"]
+    assert not capsys.readouterr().err  # it was over at once
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from repair.errors import RepairError
 from repair.paper.cases import origin_of, origin_text, paper_scenes
 from repair.paper.table1 import PEAK_NAMES, peak_of, status_of
+from repair.progress import counted
 from repair.report.tables import Section, Table, against, decimal
 
 if TYPE_CHECKING:
@@ -150,14 +151,12 @@ def sensitivity(
     Table
         A row that cannot be computed says why.
     """
-    from tqdm import tqdm
-
     scene = paper_scenes(scenario_dir, [number])[number]
     backends = _BACKENDS[number] if backends is None else backends
     chosen = VARIATIONS[number] if variations is None else variations
     data = [
         _row(number, scene, variation, backends, overrides)
-        for variation in tqdm(chosen, desc="sensitivity", disable=None, leave=False)
+        for variation in counted(chosen, len(chosen), "variations")
     ]
     origin = origin_of(scene)
     name = PEAK_NAMES[number]

@@ -11,6 +11,7 @@ from repair.backend.base import SolveStatus
 from repair.check.verdict import Reason, Violation
 from repair.errors import RepairError
 from repair.paper.cases import origin_of, origin_text, paper_scenes
+from repair.progress import Progress
 from repair.report.tables import Section, Table, against, decimal
 from repair.search.result import Probe, SearchResult
 
@@ -77,17 +78,15 @@ def table1(
     RepairError
         If a scenario cannot be used. A backend that is not there becomes a row that says so.
     """
-    from tqdm import tqdm
-
     scenes = paper_scenes(scenario_dir, scenarios)
     sections: list[Section] = []
     data: list[dict[str, Any]] = []
-    bar = tqdm(total=len(scenarios) * len(methods), desc="table I", disable=None, leave=False)
+    bar = Progress(len(scenarios) * len(methods), of="rows of table I")
     for number, scene in scenes.items():
         results = []
         for method in methods:
             results.append(_result(method, number, scene, overrides))
-            bar.update()
+            bar.one()
         ttc = next((r["ttc_s"] for r in results if r["ttc_s"] is not None), None)
         origin = origin_of(scene)
         sections.append(_section1(number, origin, ttc, results, methods))

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from repair.errors import ConfigError, RepairError
 from repair.paper.cases import origin_of, origin_text, paper_scenes
+from repair.progress import Progress
 from repair.report.tables import DASH, Section, Table, against
 from repair.search.result import SearchResult
 
@@ -129,15 +130,13 @@ def table2(
     """
     if runs < 1 or literal_runs < 1:
         raise ConfigError(f"table II needs at least one run, not {min(runs, literal_runs)}")
-    from tqdm import tqdm
-
     scenes = paper_scenes(scenario_dir, scenarios)
     sections, data = [], []
-    bar = tqdm(total=len(scenarios) * len(backends) * runs, desc="table II", disable=None, leave=False)
+    bar = Progress(len(scenarios) * len(backends) * runs, of="runs")
     for number, scene in scenes.items():
         rows = []
         for name in backends:
-            row, prepared = _timed(name, number, scene, runs, overrides, bar.update)
+            row, prepared = _timed(name, number, scene, runs, overrides, bar.one)
             if name == "ego" and literal is not None and prepared is not None:
                 slow = [
                     seconds / max(n, 1) for seconds, n in (literal(prepared) for _ in range(literal_runs))

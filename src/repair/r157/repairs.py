@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from repair.arrays import Array
+from repair.progress import counted
 from repair.r157.cases import Flags, Points
 from repair.r157.drive import drive, keep
 from repair.r157.models import FULL, Seen
@@ -132,7 +133,8 @@ def with_repairs(points: Points, asked: Asked, *, quiet: bool = False) -> Result
         ]
 
     tasks = tasks_for(conflict, asked.backends)
-    for made in _progress(_run(_repaired, tasks, asked.jobs), len(tasks), points.case, quiet):
+    shown = False if quiet else None
+    for made in counted(_run(_repaired, tasks, asked.jobs), len(tasks), f"parts of {points.case}", shown):
         found.update(made)
     models = by_models(points)
     fates = dict(models.fates)
@@ -141,7 +143,8 @@ def with_repairs(points: Points, asked: Asked, *, quiet: bool = False) -> Result
     wanted = _worth_proving(fates, never.contact, seen)
     tasks = tasks_for(np.flatnonzero(wanted), ())
     proven = np.zeros(len(points), dtype=bool)
-    for rows in _progress(_run(_proofs, tasks, asked.jobs), len(tasks), f"{points.case}, proofs", quiet):
+    words = f"parts of {points.case}, proofs"
+    for rows in counted(_run(_proofs, tasks, asked.jobs), len(tasks), words, shown):
         proven[list(rows)] = True
     return Results(points, fates, models.proven, proven, wanted)
 
@@ -161,12 +164,6 @@ def _run(work: Any, tasks: Sequence[_Task], jobs: int) -> Iterable[Any]:
         delayed(work)(task) for task in tasks
     )
     return made
-
-
-def _progress(made: Iterable[Any], count: int, words: str, quiet: bool) -> Iterator[Any]:
-    from tqdm import tqdm
-
-    yield from tqdm(made, total=count, desc=words, disable=None if not quiet else True, leave=False)
 
 
 def _worth_proving(fates: dict[str, Fate], conflict: Flags, seen: Array) -> Flags:

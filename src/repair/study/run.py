@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -13,14 +11,15 @@ from statistics import fmean
 from typing import Any
 
 from repair.errors import RepairError, in_words
+from repair.progress import Progress
 from repair.study.engine import Lanes, LocalLanes, rows_of
 from repair.study.plan import Study, Task, tasks_of
 from repair.study.rows import SweepSettings, as_sweep_row
 from repair.study.store import Store
 
-__all__ = ["Progress", "Ran", "estimate", "require_settings", "run_study", "sweep", "sweep_study"]
+__all__ = ["Ran", "estimate", "require_settings", "run_study", "sweep", "sweep_study"]
 
-_TOLD_EVERY = 30.0  # how often there is a line of progress where nobody watches a bar [s]
+_BROKEN = ("crash", "timeout", "memory", "input_error")
 
 
 @dataclass(frozen=True)
@@ -41,54 +40,6 @@ class Ran:
     def left(self) -> int:
         """Rows that are not there yet."""
         return self.tasks - self.before - self.made
-
-
-class Progress:
-    """A bar on a terminal, and elsewhere a line every half a minute.
-
-    Parameters
-    ----------
-    total, before : int
-        Rows to be there at the end, and at the beginning.
-    shown : bool, optional
-        Whether anything is to be seen; by default it is.
-    """
-
-    def __init__(self, total: int, before: int = 0, shown: bool | None = None) -> None:
-        from tqdm import tqdm
-
-        stream = sys.stderr
-        terminal = stream is not None and stream.isatty()
-        self.lines = shown is not False and not terminal
-        hidden = shown is False or not terminal
-        self.bar = tqdm(total=total, initial=before, disable=hidden, unit="row", leave=False)
-        self.total, self.before, self.made, self.broken = total, before, 0, 0
-        self.begin = self.told = time.monotonic()
-
-    def row(self, status: str) -> None:
-        """One more."""
-        self.made += 1
-        self.broken += status in ("crash", "timeout", "memory", "input_error")
-        self.bar.update()
-        self.idle()
-
-    def idle(self) -> None:
-        """Tell, if it is time to."""
-        now = time.monotonic()
-        if self.lines and now - self.told >= _TOLD_EVERY:
-            self.told = now
-            print(self.words(now - self.begin), file=sys.stderr, flush=True)
-
-    def words(self, spent: float) -> str:
-        """How far it is."""
-        there = self.before + self.made
-        left = f", about {spent / self.made * (self.total - there):.0f} s left" if self.made else ""
-        failed = f", {self.broken} could not be run" if self.broken else ""
-        return f"repair: {there} of {self.total} rows{failed}{left}"
-
-    def close(self) -> None:
-        """Take the bar away."""
-        self.bar.close()
 
 
 def run_study(
@@ -129,7 +80,7 @@ def run_study(
     try:
         for task, (row, whole) in rows_of(wanted, lanes, idle=shown.idle):
             store.add(task, row, whole)
-            shown.row(row["status"])
+            shown.one(broken=row["status"] in _BROKEN)
     finally:
         shown.close()
     return Ran(len(tasks), before, shown.made)

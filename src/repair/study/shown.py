@@ -8,9 +8,9 @@ from typing import Any
 
 from repair.errors import RepairError
 from repair.io.result_json import load_result
+from repair.progress import Progress
 from repair.report.page.html import study_page
 from repair.report.page.one import result_page
-from repair.study.run import Progress
 from repair.study.store import Store
 from repair.study.task import unpacked
 
@@ -43,7 +43,7 @@ def page_of_study(folder: Path) -> str:
             for task in done:
                 whole = store.whole(task["position"])
                 yield None if whole is None else unpacked(whole)
-                shown.row("")
+                shown.one()
             shown.close()
 
         return study_page(rows, wholes(), told, files)
