@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,7 @@ __all__ = ["Space", "depths", "looks"]
 
 _ABEAM = 1.3  # [rad]
 _INCH = 1e-3  # a margin that is kept to this is kept [m]
+_MOST = 100_000  # places of bodies and obstacles that are compared at once: 1.6 MB for each step of it
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,12 @@ class Space:
         if not len(track):
             none = np.zeros(len(s))
             return none, none
-        depth = depths(centre[:, look], heading[:, look], boxes[track, look], shapes, self._room[track])
+        depth = np.empty((len(s), len(look)))
+        for part in _parts(len(look), _MOST // len(s)):  # what is made on the way is several times as large
+            who, when = track[part], look[part]
+            depth[:, part] = depths(
+                centre[:, when], heading[:, when], boxes[who, when], shapes, self._room[who]
+            )
         return depth.sum(axis=1) / self.fine, depth.max(axis=1)
 
     def _in_boxes(self, s: Array, l: Array) -> tuple[Array, Array]:  # noqa: E741
@@ -156,6 +163,12 @@ class Space:
             np.maximum(beyond, right - spare - across, out=beyond)
             np.maximum(beyond, across - left - spare, out=beyond)
         return beyond
+
+
+def _parts(count: int, most: int) -> Iterator[slice]:
+    """``count`` things in parts of at most ``most``."""
+    step = max(most, 1)
+    return (slice(k, k + step) for k in range(0, count, step))
 
 
 def _lost(driven: Driven) -> Array:
