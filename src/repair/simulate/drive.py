@@ -36,8 +36,6 @@ class _Drive:
         What is driven; its time 0 is that of ``step``.
     mode : str
         ``plan``, ``repair`` or ``brake``.
-    planned : bool
-        It has never left the plan.
     clear : float
         How long the plan has been clear [s].
     verified : float
@@ -53,7 +51,6 @@ class _Drive:
     ego: InitialState
     step: int = 0
     mode: str = "plan"
-    planned: bool = True
     clear: float = 0.0
     verified: float = 0.0
     poses: list[Array] = field(default_factory=list)
@@ -61,7 +58,7 @@ class _Drive:
     def cycle(self, eyes: Eyes) -> CycleRecord:
         """Ask the policy, and take what it says."""
         eyes.spent, eyes.complete, eyes.solves = 0.0, True, 0
-        sight = eyes.sight(self.curve, self.ego, self.step, self.mode, planned=self.planned)
+        sight = eyes.sight(self.curve, self.ego, self.step, self.mode)
         ttc, f_ttr = float("inf"), None
         if self.mode == "plan":
             action = self._follow(sight)
@@ -110,7 +107,6 @@ class _Drive:
     def _take(self, action: Action) -> None:
         if action.kind == "keep":
             return
-        self.planned = False
         self.verified = self.step * self.grounds.scene.dt + action.until
         if action.kind == "brake":
             if self.mode == "brake":

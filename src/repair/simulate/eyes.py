@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -43,7 +43,7 @@ def driven_along(scene: Scene, curve: Curve, times: Array, orientation: float | 
 
 @dataclass(eq=False)
 class Grounds:
-    """What all policies of a drive have in common: road, plan, beliefs, and looks along the plan.
+    """What a drive is made on: road, beliefs, and those who look.
 
     Attributes
     ----------
@@ -54,8 +54,6 @@ class Grounds:
     hard : Watch
     gentle : tuple of Watch
         With the friction limits of ``simulate.gentle``.
-    looks : dict
-        Along the plan as it was made, by step: what was seen, and the processor time [s].
     """
 
     scene: Scene
@@ -63,7 +61,6 @@ class Grounds:
     beliefs: Beliefs
     hard: Watch
     gentle: tuple[Watch, ...]
-    looks: dict[int, tuple[Looked | None, float]] = field(default_factory=dict)
 
     @property
     def period(self) -> float:
@@ -110,11 +107,9 @@ class Eyes:
         finally:
             self.spent += time.process_time() - begin
 
-    def sight(
-        self, curve: Curve, ego: InitialState, step: int, mode: str = "plan", *, planned: bool = False
-    ) -> Sight:
-        """What is ahead of a curve that begins now; ``planned``: it is the plan as it was made."""
-        return Sight(self, curve, ego, step, mode, planned)
+    def sight(self, curve: Curve, ego: InitialState, step: int, mode: str = "plan") -> Sight:
+        """What is ahead of a curve that begins now."""
+        return Sight(self, curve, ego, step, mode)
 
 
 @dataclass(eq=False)
@@ -131,8 +126,6 @@ class Sight:
         Of the drive.
     mode : str
         What is driven: ``plan``, ``repair`` or ``brake``.
-    planned : bool
-        The plan as it was made.
     """
 
     eyes: Eyes
@@ -140,7 +133,6 @@ class Sight:
     ego: InitialState
     step: int
     mode: str
-    planned: bool
 
     @property
     def period(self) -> float:
@@ -155,16 +147,7 @@ class Sight:
     @cached_property
     def looked(self) -> Looked | None:
         """The look with the configured limits; None where nobody comes near."""
-        known = self.eyes.grounds.looks
-        if self.planned and self.step in known:
-            found, spent = known[self.step]
-            self.eyes.spent += spent
-            return found
-        before = self.eyes.spent
-        made = self.eyes.timed(self._look)
-        if self.planned:
-            known[self.step] = made, self.eyes.spent - before
-        return made
+        return self.eyes.timed(self._look)
 
     def _look(self) -> Looked | None:
         traffic = self._traffic()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +119,6 @@ class Case:
     world: World
     config: Config
     never: Driven
-    _beliefs: dict[str, Grounds] = field(default_factory=dict)
 
     @property
     def curve(self) -> Curve:
@@ -127,10 +126,8 @@ class Case:
         return self.plan.prepared.reference
 
     def grounds(self, prediction: str) -> Grounds:
-        """For all policies with a prediction."""
-        if prediction not in self._beliefs:
-            self._beliefs[prediction] = _grounds(self.plan, self.world, self.config, prediction)
-        return self._beliefs[prediction]
+        """With a prediction. Made anew for each drive: its cycles pay for all that they look at."""
+        return _grounds(self.plan, self.world, self.config, prediction)
 
     def drive(self, prediction: str, policy: str) -> Driven:
         """The drive."""
