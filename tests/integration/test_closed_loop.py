@@ -14,12 +14,14 @@ import shapely
 from PIL import Image
 from shapely import affinity
 
+from repair.backend.base import SolveResult, SolveStatus
 from repair.cli import main
 from repair.errors import ConfigError
 from repair.paper.synthetic import write_scenario
 from repair.scene.commonroad import load_scene
 from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
+from repair.search.rules import around
 from repair.simulate.eyes import Eyes
 from repair.simulate.many.case import Case, case_at, plan_on, simulation_config
 from repair.simulate.many.task import drive_of, run_drive
@@ -153,6 +155,73 @@ def test_a_search_that_is_carried_on_ends_where_one_in_one_go_does(cases, solves
     assert cycles > 1
     assert found.f_ttr == whole.f_ttr
     assert max(spent) <= solves + 6  # of a place that is begun all sides are tried, and one place more
+
+
+class Asked:
+    """A backend that says where it was asked, and finds nothing from some time-to-repair on."""
+
+    def __init__(self, backend, shut: float):
+        self.backend, self.shut, self.places = backend, shut, []
+
+    def __getattr__(self, name):
+        return getattr(self.backend, name)
+
+    def solve(self, problem, **keys):
+        self.places.append(round(problem.t_rep, 6))
+        if problem.t_rep > self.shut:
+            return SolveResult(SolveStatus.INFEASIBLE)
+        return self.backend.solve(problem, **keys)
+
+
+@pytest.mark.parametrize("rule, goes_round", [("guided", True), ("scan", False)])
+def test_after_a_cycle_with_nothing_the_search_goes_round(cases, rule, goes_round):
+    """What serves the decision is asked in every cycle, and the rest of what is searched in several."""
+    case, solves = cases["scenario_1"], 3
+    watch = case.plan.hard.twin()
+    watch.config = replace(watch.config, search=replace(watch.config.search, rule=rule))
+    watch._backend = asked = Asked(watch._backend, -1.0)
+    start = case.plan.scene.initial_state
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
+
+    def cycle(shut=()):
+        asked.places.clear()
+        looked = watch.look(case.curve, traffic=traffic, ego=ego)
+        return watch.answer(looked, enough=0.2, solves=solves, shut=shut), list(asked.places)
+
+    first, whole = cycle()
+    assert first.curve is None
+    assert first.complete
+    assert len(whole) > solves + 2
+    later, others = [cycle() for _ in range(2 * len(whole))], []
+    for found, places in later:
+        assert found.curve is None
+        if not goes_round:
+            assert places == whole
+            continue
+        assert not found.complete
+        assert list(dict.fromkeys(places))[:2] == [0.2, 0.0]
+        assert len(places) < len(whole)
+        others += [place for place in dict.fromkeys(places) if place not in (0.2, 0.0)]
+    if not goes_round:
+        return
+    last, downwards = round(10.0 * whole[0]), []
+    order = around(last, -1, last + 1)
+    k = next(order)
+    while k > 2:
+        downwards.append(pytest.approx(0.1 * k))
+        k = order.send(False)
+    assert others[: 2 * len(downwards)] == 2 * downwards
+    assert 0.0 not in cycle(shut=(0.0,))[1][:2]
+    asked.shut = np.inf  # a repair that can be waited for is found first, and the round goes on
+    found, places = cycle()
+    assert found.f_ttr == pytest.approx(0.2)
+    assert set(places) == {0.2}
+    assert not found.complete
+    while not found.complete:
+        found, _ = cycle()
+    looked = watch.look(case.curve, traffic=traffic, ego=ego)
+    assert found.f_ttr == case.plan.hard.twin().answer(looked, enough=0.2).f_ttr
 
 
 def test_the_road_is_laid_out_once_for_all_drives(cases):

@@ -46,12 +46,12 @@ def test_a_stint_ends_where_a_repair_can_be_waited_for(probes, needed, ended):
     assert not without.ended
 
 
-def places_from(guess, known, above, size):
+def places_from(guess, known, above, stride, size):
     """As :func:`repair.cycle.searching.searched` visits them."""
     known = -1 if known is None else round(known / STEP)
     if above is not None:
         size = min(size, max(int(np.ceil(above / STEP - INSTANT)), known + 1))
-    return around(int(np.floor(guess / STEP + INSTANT)), known, size)
+    return around(int(np.floor(guess / STEP + INSTANT)), known, size, max(round(stride / STEP), 1))
 
 
 def visited(order, stint, feasible):
@@ -70,11 +70,13 @@ def visited(order, stint, feasible):
 @given(last=st.integers(-1, 40), size=st.integers(1, 41), first=st.integers(0, 40), solves=st.integers(1, 4))
 def test_what_is_carried_on_ends_at_the_last_place_with_a_repair(last, size, first, solves):
     """Cycle after cycle at the same time, by a rule that takes feasibility to be contiguous."""
-    on, best, end = (None, min(first, size - 1) * STEP, None), None, size * STEP
+    on, best, end = (None, min(first, size - 1) * STEP, None, STEP), None, size * STEP
+    places = []
     for _ in range(13):
-        known, guess, above = on
+        known, guess, above, stride = on
         stint = Stint(solves, 0.0, best=-np.inf if known is None else known)
-        found = visited(places_from(guess, known, above, size), stint, lambda k: k <= last)
+        found = visited(places_from(guess, known, above, stride, size), stint, lambda k: k <= last)
+        places += [round(one.t_rep / STEP) for one in found]
         assert len(found) == solves or not stint.ended
         best = max((one.t_rep for one in found if one.feasible), default=known)
         carried = carried_from(found, 0.0, end, STEP, (known, above)) if stint.ended else None
@@ -83,13 +85,16 @@ def test_what_is_carried_on_ends_at_the_last_place_with_a_repair(last, size, fir
             break
     assert on is None
     assert (-1 if best is None else round(best / STEP)) == min(last, size - 1)
+    whole = visited(around(min(first, size - 1), -1, size), Stint(None, 0.0), lambda k: k <= last)
+    assert places == [round(one.t_rep / STEP) for one in whole]  # none is left out, none asked twice
 
 
 def test_what_is_kept_meanwhile_does_not_end_a_search_from_above():
     """Nothing at 0.9 and 0.8 s; the repair at 0.2 s is kept, and the next place is 0.6 s."""
+    assert carried_from([], 1.0, 1.2, STEP).seen_from(1.2, 0.2) == (None, None, None, None)  # from the start
     carried = carried_from([probe(9, False), probe(8, False)], 1.0, 1.2, STEP)
-    assert carried.seen_from(1.0, 0.2) == (None, pytest.approx(0.6), pytest.approx(0.8))
-    assert carried.seen_from(1.2, 0.0) == (None, pytest.approx(0.4), pytest.approx(0.6))
+    assert carried.seen_from(1.0, 0.2) == (None, *map(pytest.approx, (0.6, 0.8, 0.4)))
+    assert carried.seen_from(1.2, 0.0) == (None, *map(pytest.approx, (0.4, 0.6, 0.4)))
     assert carried.seen_from(1.2, 0.6) is None
     found = carried_from([probe(6, False), probe(2, True)], 1.0, 1.2, STEP, (None, 0.8))
-    assert found.seen_from(1.0, 0.2) == (0.2, pytest.approx(0.4), pytest.approx(0.6))
+    assert found.seen_from(1.0, 0.2) == pytest.approx((0.2, 0.4, 0.6, 1.6))

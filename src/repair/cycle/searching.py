@@ -30,6 +30,7 @@ def searched(
     *,
     thorough: bool = False,
     above: float | None = None,
+    stride: float | None = None,
     on_probe: Callable[[Probe], None] | None = None,
 ) -> SearchResult:
     """The F-TTR of a cycle.
@@ -49,11 +50,13 @@ def searched(
         rules look no further where what they begin with is not.
     above : float, optional
         From where on nothing was found [s]: with such a rule nothing is visited there.
+    stride : float, optional
+        How much farther such a rule looks after ``guess`` [s], by default by one step of the grid.
     on_probe : callable, optional
         Called after every probe; one that raises :class:`repair.deadline.OutOfTime` ends the search.
     """
     begin = time.perf_counter()
-    found = _searched(prepared, backend, settings, kept, guess, above, on_probe)
+    found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe)
     nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
     if thorough and nothing and settings.rule in _CONTIGUOUS:
         return _the_rest(prepared, backend, settings, begin, found)
@@ -67,6 +70,7 @@ def _searched(
     kept: float | None,
     guess: float | None,
     above: float | None,
+    stride: float | None,
     on_probe: Callable[[Probe], None] | None,
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
@@ -82,7 +86,7 @@ def _searched(
     size = intervals(end, step)
     if above is not None:
         size = min(size, max(int(np.ceil(above / step - INSTANT)), known + 1))
-    order = around(first, known, size)
+    order = around(first, known, size, 1 if stride is None else max(round(stride / step), 1))
     probes: tuple[Probe, ...] = ()
     complete, k = True, next(order, None)
     while k is not None and complete:

@@ -61,7 +61,7 @@ def from_the_end(end: float, delta_t: float) -> Order:
         k = (feasible + infeasible) // 2
 
 
-def around(first: int, feasible: int, size: int) -> Generator[int, bool, None]:
+def around(first: int, feasible: int, size: int, stride: int = 1) -> Generator[int, bool, None]:
     """From a point of the grid on to where feasible and infeasible meet.
 
     Parameters
@@ -72,13 +72,15 @@ def around(first: int, feasible: int, size: int) -> Generator[int, bool, None]:
         The last point that is known to be feasible; -1 where none is.
     size : int
         Number of points.
+    stride : int
+        How much farther it looks after the first point; twice as far each time.
 
     Yields
     ------
     int
         The next point; sent is whether it was feasible.
     """
-    infeasible, k, stride = size, first, 1
+    infeasible, k = size, first
     while infeasible - feasible > 1:
         k = min(max(k, feasible + 1), infeasible - 1)
         if (yield k):

@@ -85,7 +85,9 @@ class Carried:
     stride: float
     bracketed: bool
 
-    def seen_from(self, now: float, kept: float | None) -> tuple[float | None, float, float | None] | None:
+    def seen_from(
+        self, now: float, kept: float | None
+    ) -> tuple[float | None, float | None, float | None, float | None] | None:
         """Where a later cycle goes on.
 
         Parameters
@@ -97,17 +99,19 @@ class Carried:
 
         Returns
         -------
-        kept, guess, above : float or None
+        kept, guess, above, stride : float or None
             See :func:`repair.cycle.searching.searched`; None where nothing is left of the search.
         """
         above = self.above - (now - self.now)
         if above <= max(kept or 0.0, 0.0) + INSTANT:
             return None
+        if not self.bracketed and np.isinf(above):
+            return None, None, None, None  # where the search's rule begins
         if kept is None or not self.bracketed:
-            return None, max(above - self.stride, 0.0), above
+            return None, max(above - self.stride, 0.0), above, 2.0 * self.stride
         if np.isfinite(above):
-            return kept, 0.5 * (kept + above), above
-        return kept, kept + self.stride, None
+            return kept, 0.5 * (kept + above), above, 2.0 * self.stride
+        return kept, kept + self.stride, None, 2.0 * self.stride
 
 
 def carried_from(

@@ -23,6 +23,7 @@ from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
 from repair.search.result import Probe, SearchStatus
 from repair.search.rules import CONTIGUOUS
+from repair.search.settings import SearchConfig
 from repair.simulate.carried import Carried, Stint, carried_from
 from repair.timegrid import INSTANT
 from repair.world.boxes import MakeBoxes
@@ -88,6 +89,7 @@ class Watch(Repairer):
 
     _edged: Checker | None = None
     _carried: Carried | None = None
+    _nothing: Carried | None = None  # the round of searches that have found nothing, cycle after cycle
 
     def along(self, checker: Checker) -> Watch:
         """Itself, with the road's edge as it is laid out already for a checker on the same road."""
@@ -98,7 +100,7 @@ class Watch(Repairer):
         """Another one for the same road, with what is laid out of it and nothing of what was found."""
         made = copy(self)
         made.reset()
-        made._edged, made._carried = self._edged, None
+        made._edged, made._carried, made._nothing = self._edged, None, None
         return made
 
     def look(
@@ -152,6 +154,7 @@ class Watch(Repairer):
         visits: tuple[float, ...] | None = None,
         enough: float | None = None,
         solves: int | None = None,
+        shut: tuple[float, ...] = (),
     ) -> Found:
         """The search among what was looked at.
 
@@ -168,6 +171,9 @@ class Watch(Repairer):
         solves : int, optional
             After so many the rest of the search is left for the next cycle, if there is a repair that can be
             waited for: where none was found, it is looked for there, and then the search goes to its end.
+            After a cycle that has found nothing at all a search is made anew in several cycles.
+        shut : tuple of float, optional
+            Times-to-repair at which nothing was found in this cycle [s].
         """
         prepared, settings, begin = looked.prepared, self.config.search, time.perf_counter()
         if limit is not None:
@@ -176,27 +182,30 @@ class Watch(Repairer):
             made = find(prepared, self._backend, settings=settings, visits=visits)
             tried = sum(max(len(probe.tried), 1) for probe in made.probes)
             return _found(prepared, made.f_ttr, made.curve, False, made.complete, tried)
-        last, carried, self._carried = self._kept, self._carried, None
+        last, carried, nothing = self._kept, self._carried, self._nothing
+        self._carried = self._nothing = None
         kept = None if last is None else verified_again(last, prepared, looked.now)
         enough, latest = enough or 0.0, np.inf if enough is None else enough + INSTANT  # a cycle ago
-        on = None
-        if carried is not None and looked.now - carried.now <= latest and (last is None or kept is not None):
+        safe, on = kept is not None and kept[0] >= enough - INSTANT, None
+        if carried is not None and looked.now - carried.now <= latest and (last is None or safe):
             on = carried.seen_from(looked.now, None if kept is None else kept[0])
-        safe = kept is not None and kept[0] >= enough - INSTANT
         if kept is not None and safe and on is None and latest < np.inf:
             return _found(prepared, *kept, True, True)
+        goes_round = solves is not None and settings.rule in CONTIGUOUS and latest < np.inf
+        if goes_round and kept is None and nothing is not None and looked.now - nothing.now <= latest:
+            return self._once_more(looked, settings, nothing, enough, solves or 0, shut)
         if limit is not None:
             left = max(limit - (time.perf_counter() - begin), 1e-6)
             settings = replace(settings, time_limit=left)
         if on is not None:
-            known, guess, above = on
+            known, guess, above, stride = on
         else:
-            known, guess, above = None if kept is None else kept[0], None, None
+            known, guess, above, stride = None if kept is None else kept[0], None, None, None
             if last is not None and kept is None and last.due(looked.now) >= 0.0:
                 guess = last.due(looked.now)
         stint = Stint(solves, enough, best=-np.inf if known is None else known)
         made = searched(
-            prepared, self._backend, settings, known, guess, above=above,
+            prepared, self._backend, settings, known, guess, above=above, stride=stride,
             on_probe=stint if settings.rule in CONTIGUOUS else None,
         )  # fmt: skip
         best, complete = known if made.f_ttr is None else made.f_ttr, made.complete
@@ -214,7 +223,8 @@ class Watch(Repairer):
             rest = None if self._carried is None else self._carried.seen_from(looked.now, None)
             if made.curve is None and rest is not None:  # there is none to wait on: to its end, as it began
                 made = searched(
-                    prepared, self._backend, settings, None, rest[1], above=rest[2], on_probe=stint
+                    prepared, self._backend, settings, None, rest[1], above=rest[2], stride=rest[3],
+                    on_probe=stint,
                 )  # fmt: skip
                 self._carried, complete = None, made.complete
                 if stint.ended:
@@ -228,7 +238,56 @@ class Watch(Repairer):
             return _found(prepared, *kept, True, complete, stint.spent)
         if made.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
+        if made.status is SearchStatus.NONE_FEASIBLE and goes_round and stint.spent > (solves or 0):
+            self._nothing = Carried(looked.now, np.inf, settings.delta_t, False)
         return _found(prepared, made.f_ttr, None, False, complete, stint.spent)
+
+    def _once_more(
+        self,
+        looked: Looked,
+        settings: SearchConfig,
+        nothing: Carried,
+        enough: float,
+        solves: int,
+        shut: tuple[float, ...],
+    ) -> Found:
+        """After a cycle that has found nothing: the places that decide what is done now, and some others.
+
+        A repair that can be waited for, and one that begins at once; then the search is made as far as
+        ``solves`` go, by one place at least, and the next cycle goes on with it.
+        """
+        prepared, step, begin = looked.prepared, settings.delta_t, time.perf_counter()
+        places = (float(np.ceil(enough / step - INSTANT)) * step, 0.0)
+        end = self._end(looked)
+        first = tuple(t for t in places if t not in shut and (t < end - INSTANT or t <= 0.0))
+        stint = Stint(0, 0.0, needed=True)
+        made = find(prepared, self._backend, settings=settings, visits=first, on_probe=stint)
+        if made.curve is not None:  # what is waited on; the round goes on: feasibility may have gaps
+            since = nothing.above - (looked.now - nothing.now)
+            carried: Carried | None = replace(nothing, now=looked.now, above=since)
+        else:
+            on = nothing.seen_from(looked.now, None)
+            if on is None or (on[1] is not None and on[1] <= places[0] + INSTANT):  # the round is over
+                on = None, None, None, None
+            _, guess, above, stride = on
+            if settings.time_limit is not None:
+                left = max(settings.time_limit - (time.perf_counter() - begin), 1e-6)
+                settings = replace(settings, time_limit=left)
+            before = stint.spent
+            stint = Stint(max(solves - before, 1) + before, 0.0, spent=before)
+            made = searched(
+                prepared, self._backend, settings, None, guess, above=above, stride=stride, on_probe=stint
+            )  # fmt: skip
+            carried = None
+            if not made.complete:
+                carried = self._left_of(looked, made.probes, stint.ended, (None, above))
+        if made.curve is None or made.f_ttr is None:
+            self._kept = None
+            self._nothing = carried or Carried(looked.now, np.inf, step, False)
+            return _found(prepared, None, None, False, False, stint.spent)
+        self._carried = carried
+        self._kept = KeptRepair(made.curve, made.f_ttr, looked.now, prepared.scene.frame)
+        return _found(prepared, made.f_ttr, made.curve, False, carried is None, stint.spent)
 
     def _left_of(
         self,
@@ -241,8 +300,12 @@ class Watch(Repairer):
         settings = self.config.search
         if not ended and probes and not probes[-1].feasible:
             probes = probes[:-1]  # nobody knows what would have come of the one that ran out of time
-        end = looked.conflict.time if settings.upper is None else min(looked.conflict.time, settings.upper)
-        return carried_from(probes, looked.now, end, settings.delta_t, before)
+        return carried_from(probes, looked.now, self._end(looked), settings.delta_t, before)
+
+    def _end(self, looked: Looked) -> float:
+        """Where the grid ends [s], excluded."""
+        upper = self.config.search.upper
+        return looked.conflict.time if upper is None else min(looked.conflict.time, upper)
 
 
 def _found(
