@@ -42,7 +42,7 @@ from repair.situation import Situation
 from repair.solvers.registry import sections
 from repair.timegrid import INSTANT, on_grid, steps_until
 from repair.vehicle.parameters import Vehicle
-from repair.world.boxes import Boxes, MakeBoxes, Occupancy, shrink_to_start
+from repair.world.boxes import Boxes, Occupancy, shrink_to_start
 from repair.world.occupancy import Within, build_occupancy
 
 __all__ = ["Phases", "Prepared", "again_for", "among", "laid_out", "prepare", "what_matters"]
@@ -192,7 +192,6 @@ def laid_out(
     reference: Curve | None = None,
     like: Checker | None = None,
     within_reach: bool = False,
-    boxes_of: MakeBoxes | None = None,
 ) -> Prepared:
     """What is searched, in a frame that stays as it is.
 
@@ -207,8 +206,6 @@ def laid_out(
         One for the same road, whose edge is taken over.
     within_reach : bool
         Obstacles out of the ego's reach until the repairs end are left without boxes.
-    boxes_of : callable, optional
-        Makes the boxes, instead of those of the scene's obstacles.
     """
     vehicle = scene.vehicle
     room = config.checker.clearance + _BODY_MARGIN
@@ -221,15 +218,10 @@ def laid_out(
         checker = Checker(scene, limits, sampled(config.checker, scene.dt), allowed[0], like)
         touching = checker.touching_at_start()
     offsets = s_offset, l_offset
-    project = boxes_of or partial(build_occupancy, scene.obstacles)
 
     def all_boxes(until: float = np.inf) -> Boxes:
-        def make() -> tuple[Occupancy, tuple[str, ...]]:
-            reach = (scene, config, limits, given, reference, until)
-            part = _part_in_reach(*reach) if within_reach else None
-            return project(scene.frame, scene.dt, *offsets, part)
-
-        return Boxes(make)
+        part = partial(_part_in_reach, scene, config, limits, given, reference, until)
+        return Boxes(partial(_boxes, scene, offsets, part if within_reach else None))
 
     whole = all_boxes()
     if not within_reach:
@@ -297,6 +289,14 @@ def _part_in_reach(
     if followed is not None:
         places = scene.frame.to_cartesian(*followed.sample(scene.times).position.T)
     return None if places is None else part_in_reach(scene, config.repair, limits, places, until)
+
+
+def _boxes(
+    scene: Scene, offsets: tuple[float, float], within: Callable[[], Within | None] | None
+) -> tuple[Occupancy, tuple[str, ...]]:
+    """The traffic as boxes, and who is not seen by them."""
+    part = None if within is None else within()
+    return build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets, part)
 
 
 def _said(

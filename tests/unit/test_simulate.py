@@ -14,7 +14,6 @@ from repair.config.simulate import SimulateConfig
 from repair.errors import ConfigError, RepairError
 from repair.reference.profile import SpeedProfile
 from repair.report.loop.table import interval, summary, table_of
-from repair.scene.frame import FrenetFrame
 from repair.scene.road.lanes import Lane
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import rigid_outline
@@ -28,14 +27,12 @@ from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.policies.registry import POLICIES, make_policy
 from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
 from repair.simulate.watch import Found
-from repair.simulate.wide import boxes_around
 from repair.simulate.world import Beliefs, World, displaced, widened
 from repair.study.rows import strict
 from repair.study.store import Store
 from repair.study.task import packed
 from repair.vehicle.model import vehicle_model
 from repair.world.collision import CollisionWorld
-from repair.world.occupancy import build_occupancy
 
 DT = 0.1
 VEHICLE = vehicle_model(2).parameters
@@ -149,29 +146,6 @@ def test_everybody_is_widened_along_the_way_and_nobody_backs_up(error, v):
     assert (np.diff(behind) > -1e-9).all()
     assert (plain - behind <= 0.5 * error * t**2 + 1e-9).all()
     np.testing.assert_allclose(found[1].rectangles[:, :2], found[1].states[:, :2])
-
-
-@pytest.mark.parametrize("bend", [0.0, 1.0 / 80.0, -1.0 / 50.0])
-def test_boxes_are_moved_instead_of_being_projected_again(bend):
-    """On a straight road exactly; in a bend as the tangent has it: off by the square of the distance."""
-    angle = np.linspace(0.0, 200.0 * bend, 401) if bend else np.zeros(401)
-    way = np.cumsum(0.5 * np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)
-    frame = FrenetFrame.from_points(way)
-    cars = tuple(
-        body(straight(x, y, heading, v), name=k)
-        for k, (x, y, heading, v) in enumerate(
-            [(40.0, 0.5, 0.05, 8.0), (60.0, -20.0, 1.3, 6.0), (30.0, 3.0, 0.0, 0.0)]
-        )
-    )
-    error, sizes = 0.5, (2.6, 1.2)
-    found, _ = boxes_around(cars, error, frame, DT, *sizes)
-    each, _ = build_occupancy(widened(cars, error, DT), frame, DT, *sizes)
-    off = 0.5 * error * (np.arange(61) * DT) ** 2
-    room = 0.02 + 1.3 * abs(bend) * (off**2 + 12.0 * off)  # corners are up to 12 m from where the tangent is
-    assert found.ids.tolist() == each.ids.tolist() == [0, 1, 2, 0, 1, 0, 1]
-    for one, two in ((found.lower, each.lower), (found.upper, each.upper)):
-        assert np.isfinite(one).all()
-        assert (np.abs(one - two).max(axis=2) <= room).all()
 
 
 @given(seed=st.integers(0, 999))

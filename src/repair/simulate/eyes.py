@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -19,7 +19,6 @@ from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.obstacle import Obstacle, Traffic
 from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.watch import Found, Looked, Watch
-from repair.simulate.wide import boxes_around
 from repair.simulate.world import Beliefs, displaced, widened
 from repair.vehicle.states import DrivenStates
 
@@ -209,10 +208,7 @@ class Sight:
 
         def look() -> Looked:
             error = grounds.config.simulate.error
-            return watch.look(
-                self.curve, traffic=self._traffic(error), ego=self.ego, now=self.now,
-                boxes_of=partial(boxes_around, self._near, error),
-            )  # fmt: skip
+            return watch.look(self.curve, traffic=self._traffic(error), ego=self.ego, now=self.now)
 
         looked = self.eyes.timed(look)
         if looked.conflict.time == float("inf"):

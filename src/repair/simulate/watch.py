@@ -26,7 +26,6 @@ from repair.search.rules import CONTIGUOUS
 from repair.search.settings import SearchConfig
 from repair.simulate.carried import Carried, Stint, carried_from
 from repair.timegrid import INSTANT
-from repair.world.boxes import MakeBoxes
 
 __all__ = ["Found", "Looked", "Watch"]
 
@@ -110,7 +109,6 @@ class Watch(Repairer):
         traffic: Traffic,
         ego: InitialState,
         now: float = 0.0,
-        boxes_of: MakeBoxes | None = None,
     ) -> Looked:
         """The conflict of a curve, without a search.
 
@@ -124,8 +122,6 @@ class Watch(Repairer):
             At the beginning of the curve.
         now : float
             [s] since the planning problem's start; a multiple of the scenario's step.
-        boxes_of : callable, optional
-            Makes the boxes of a search, instead of those of the traffic.
 
         Raises
         ------
@@ -140,9 +136,8 @@ class Watch(Repairer):
             first_heading=ego.orientation,
         )  # fmt: skip
         prepared = laid_out(
-            scene, self.config, None, Phases(), reference=curve, like=self._edged, within_reach=True,
-            boxes_of=boxes_of,
-        )  # fmt: skip
+            scene, self.config, None, Phases(), reference=curve, like=self._edged, within_reach=True
+        )
         self._edged = prepared.checker
         return Looked(now, prepared)
 
@@ -171,13 +166,21 @@ class Watch(Repairer):
         solves : int, optional
             After so many the rest of the search is left for the next cycle, if there is a repair that can be
             waited for: where none was found, it is looked for there, and then the search goes to its end.
-            After a cycle that has found nothing at all a search is made anew in several cycles.
+            Where nothing to wait on comes of one that was carried on, it is made anew. After a cycle that
+            has found nothing at all, the next ones make theirs in several cycles.
         shut : tuple of float, optional
             Times-to-repair at which nothing was found in this cycle [s].
         """
         prepared, settings, begin = looked.prepared, self.config.search, time.perf_counter()
         if limit is not None:
             settings = replace(settings, time_limit=min(limit, settings.time_limit or limit))
+
+        def timely() -> SearchConfig:
+            """With what is left of a limit."""
+            if limit is None:
+                return settings
+            return replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 1e-6))
+
         if visits is not None:
             made = find(prepared, self._backend, settings=settings, visits=visits)
             tried = sum(max(len(probe.tried), 1) for probe in made.probes)
@@ -187,16 +190,16 @@ class Watch(Repairer):
         kept = None if last is None else verified_again(last, prepared, looked.now)
         enough, latest = enough or 0.0, np.inf if enough is None else enough + INSTANT  # a cycle ago
         safe, on = kept is not None and kept[0] >= enough - INSTANT, None
-        if carried is not None and looked.now - carried.now <= latest and (last is None or safe):
+        if carried is not None and looked.now - carried.now <= latest and (last is None or kept is not None):
             on = carried.seen_from(looked.now, None if kept is None else kept[0])
         if kept is not None and safe and on is None and latest < np.inf:
             return _found(prepared, *kept, True, True)
-        goes_round = solves is not None and settings.rule in CONTIGUOUS and latest < np.inf
+        contiguous = settings.rule in CONTIGUOUS
+        goes_round = solves is not None and contiguous and latest < np.inf
+        if looked.conflict.time == np.inf:
+            nothing = None
         if goes_round and kept is None and nothing is not None and looked.now - nothing.now <= latest:
-            return self._once_more(looked, settings, nothing, enough, solves or 0, shut)
-        if limit is not None:
-            left = max(limit - (time.perf_counter() - begin), 1e-6)
-            settings = replace(settings, time_limit=left)
+            return self._once_more(looked, timely(), nothing, enough, solves or 0, shut)
         if on is not None:
             known, guess, above, stride = on
         else:
@@ -205,25 +208,30 @@ class Watch(Repairer):
                 guess = last.due(looked.now)
         stint = Stint(solves, enough, best=-np.inf if known is None else known)
         made = searched(
-            prepared, self._backend, settings, known, guess, above=above, stride=stride,
-            on_probe=stint if settings.rule in CONTIGUOUS else None,
+            prepared, self._backend, timely(), known, guess, above=above, stride=stride,
+            on_probe=stint if contiguous else None,
         )  # fmt: skip
         best, complete = known if made.f_ttr is None else made.f_ttr, made.complete
+        if on is not None and contiguous and complete and (best is None or best < enough - INSTANT):
+            # Nothing to wait on comes of it, and where nothing was in earlier cycles there may be by now.
+            stint = Stint(solves, enough, needed=True, best=stint.best, spent=stint.spent)
+            anew = searched(prepared, self._backend, timely(), best, None, on_probe=stint)
+            known, above, complete = best, None, anew.complete
+            if anew.curve is not None:
+                made, best = anew, anew.f_ttr
         if not complete:
             self._carried = self._left_of(looked, made.probes, stint.ended, (known, above))
             complete = stint.ended and self._carried is None
         if stint.ended and best is None and not safe:
-            if limit is not None:
-                settings = replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 1e-6))
             stint = Stint(0, enough, needed=True, spent=stint.spent)
             nearer, step = min(probe.t_rep for probe in made.probes), settings.delta_t
             at = float(np.ceil(enough / step - INSTANT)) * step
             if at < nearer - INSTANT:
-                made = find(prepared, self._backend, settings=settings, visits=(at,), on_probe=stint)
+                made = find(prepared, self._backend, settings=timely(), visits=(at,), on_probe=stint)
             rest = None if self._carried is None else self._carried.seen_from(looked.now, None)
             if made.curve is None and rest is not None:  # there is none to wait on: to its end, as it began
                 made = searched(
-                    prepared, self._backend, settings, None, rest[1], above=rest[2], stride=rest[3],
+                    prepared, self._backend, timely(), None, rest[1], above=rest[2], stride=rest[3],
                     on_probe=stint,
                 )  # fmt: skip
                 self._carried, complete = None, made.complete

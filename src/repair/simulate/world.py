@@ -12,7 +12,7 @@ from repair.scene.road.lanes import Lane
 from repair.scene.traffic.obstacle import Obstacle
 from repair.simulate.predictions.base import Known, Predictor, cut
 
-__all__ = ["Beliefs", "World", "displaced", "displacement", "widened"]
+__all__ = ["Beliefs", "World", "displaced", "widened"]
 
 _STATED = frozenset(
     {"static", "environment", "phantom", "set_based"}
@@ -124,21 +124,15 @@ def displaced(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple
     return tuple(_displaced(one, error, dt) for one in obstacles)
 
 
-def displacement(one: Obstacle, error: float, dt: float) -> Array | None:
-    """By how much somebody is moved along his headings at each step (T,) [m]; None where he stays."""
+def _displaced(one: Obstacle, error: float, dt: float) -> Obstacle:
     places = one.states[:, :2]
     if one.role in _STATED or not np.isfinite(places).all():
-        return None
+        return one
     arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
     if arc[-1] < _MOVES:
-        return None
+        return one
     off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
-    return np.asarray(np.maximum.accumulate(np.maximum(arc + off, 0.0)) - arc)
-
-
-def _displaced(one: Obstacle, error: float, dt: float) -> Obstacle:
-    by = displacement(one, error, dt)
-    return one if by is None else _along(one, by)
+    return _along(one, np.maximum.accumulate(np.maximum(arc + off, 0.0)) - arc)
 
 
 def _along(one: Obstacle, by: Array) -> Obstacle:

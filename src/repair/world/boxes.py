@@ -13,7 +13,7 @@ import numpy.typing as npt
 from repair.arrays import Array, frozen, names
 from repair.timegrid import STEP
 
-__all__ = ["Boxes", "MakeBoxes", "Occupancy", "nothing", "shrink_to_start"]
+__all__ = ["Boxes", "Occupancy", "nothing", "shrink_to_start"]
 
 _OUTSIDE = 1e-6  # a reduced box ends this far from where the reference was [m]
 _KEPT = 1000  # times of a query whose places among the steps are kept
@@ -108,10 +108,6 @@ def nothing(t: Array) -> Occupancy:
     """No obstacles, at times (T,) [s]."""
     none = frozen(np.empty((0, len(t), 2)))
     return Occupancy(frozen(t), names([]), none, none, np.empty(0, dtype=np.bool_))
-
-
-#: As :func:`repair.world.occupancy.build_occupancy`, of obstacles that it knows.
-MakeBoxes = Callable[..., tuple[Occupancy, tuple[str, ...]]]
 
 
 class Boxes:
