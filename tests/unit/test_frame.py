@@ -121,6 +121,18 @@ def test_most_of_what_is_beside_a_road_is_known_to_be_nearest(frame: FrenetFrame
         assert np.median(reach) > 4.0
 
 
+def test_a_bend_between_two_places_counts_as_well() -> None:
+    """A metre of a bend, and back, between two of the places that are looked at: its middle is a bound."""
+    heading = np.where(np.arange(80) < 42, 0.0, np.where(np.arange(80) < 44, 1.3, 0.52))
+    path = np.cumsum(0.5 * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    made = FrenetFrame.from_points(path, max_lateral=20.0)
+    assert np.abs(made.curvature_table).max() > 0.5
+    for side in (-1.0, 1.0):
+        reach = alone(made, made.s, np.full(len(made.s), side))
+        assert (reach * side * made.curvature_table).max() < 0.7
+        assert reach.max() > 10.0
+
+
 def test_near_picks_the_branch_where_the_path_passes_twice() -> None:
     phi = np.linspace(0.0, 2.2 * 2 * np.pi, 800)
     made = FrenetFrame.from_points(12.0 * np.stack([np.cos(phi), np.sin(phi)], axis=1), smoothing=0.02)

@@ -58,7 +58,8 @@ def _reach(frame: FrenetFrame) -> Array:
     """:func:`alone` for the cells of a frame, right (0) and left (1) of it (2, M).
 
     A circle that touches the path at p, with its middle on the side of n, holds no other place q of the path
-    if its radius is at most |q - p|² / (2 n . (q - p)).
+    if its radius is at most |q - p|² / (2 n . (q - p)), and none right beside p if it is at most that of the
+    bend there. Bends are looked at wherever the frame is tabulated: the sharpest may lie between two p.
     """
     at = np.arange(0.0, frame.length + 2.0 * _SPACING, _SPACING)
     place = np.ascontiguousarray(frame.position(at)).view(np.complex128)[:, 0]
@@ -69,5 +70,10 @@ def _reach(frame: FrenetFrame) -> Array:
         radius = np.full(square.shape, np.inf)
         np.divide(0.5 * square, sideways, out=radius, where=sideways > 1e-9)
         found[side] = radius.min(axis=1)
-    around = np.minimum(found[:, 1:], found[:, :-1])
+    # One cell more on either side: the other foot of a wiggle may be there.
+    cell, sharpest = (frame.s / _SPACING).astype(np.intp), np.full((2, len(at) + 1), 1e-9)
+    for side, bend in enumerate((-frame.curvature_table, frame.curvature_table)):
+        np.maximum.at(sharpest[side], cell + 1, bend)
+    sharpest = np.maximum(np.maximum(sharpest[:, :-2], sharpest[:, 1:-1]), sharpest[:, 2:])
+    around = np.minimum(np.minimum(found[:, 1:], found[:, :-1]), 1.0 / sharpest)
     return frozen(np.clip(_PART * around - _SPACING, 0.0, 0.9 * frame.max_lateral))
