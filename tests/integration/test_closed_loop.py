@@ -193,7 +193,7 @@ def test_after_a_cycle_with_nothing_the_search_goes_round(cases, rule, goes_roun
     assert first.curve is None
     assert first.complete
     assert len(whole) > solves + 2
-    later, others = [cycle() for _ in range(2 * len(whole))], []
+    later, others = [cycle() for _ in range(2 * len(whole) if goes_round else 2)], []
     for found, places in later:
         assert found.curve is None
         if not goes_round:
@@ -222,6 +222,37 @@ def test_after_a_cycle_with_nothing_the_search_goes_round(cases, rule, goes_roun
         found, _ = cycle()
     looked = watch.look(case.curve, traffic=traffic, ego=ego)
     assert found.f_ttr == case.plan.hard.twin().answer(looked, enough=0.2).f_ttr
+
+
+def test_where_nothing_to_wait_on_is_left_of_a_search_it_is_made_anew(cases):
+    case = cases["scenario_1"]
+    watch = case.plan.hard.twin()
+    watch._backend = asked = Asked(watch._backend, 1.4 + 1e-9)
+    start = case.plan.scene.initial_state
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
+    looked = watch.look(case.curve, traffic=traffic, ego=ego)
+    for _ in range(9):
+        found = watch.answer(looked, enough=1.4, solves=1)
+        assert found.f_ttr == pytest.approx(1.4)
+        if watch._carried.above < 1.55:
+            break
+    assert not found.complete
+    asked.shut = np.inf  # from now on there are repairs where nothing was found before
+    found = watch.answer(looked, enough=1.6, solves=1)
+    assert found.f_ttr >= 1.6 - 1e-9
+
+
+def test_each_drive_looks_for_itself(cases):
+    """Its cycle times hold all that it uses: nobody finds boxes that another one has paid for."""
+    case = cases["scenario_1"]
+    first, second = (
+        Eyes(case.grounds("recorded")).sight(case.curve, case.plan.scene.initial_state, 0) for _ in range(2)
+    )
+    assert first.cycle.f_ttr > 0.0
+    assert first.looked.prepared.boxes.known
+    assert not second.looked.prepared.boxes.known
+    assert first.eyes.grounds.beliefs is not second.eyes.grounds.beliefs
 
 
 def test_the_road_is_laid_out_once_for_all_drives(cases):

@@ -212,13 +212,6 @@ class Watch(Repairer):
             on_probe=stint if contiguous else None,
         )  # fmt: skip
         best, complete = known if made.f_ttr is None else made.f_ttr, made.complete
-        if on is not None and contiguous and complete and (best is None or best < enough - INSTANT):
-            # Nothing to wait on comes of it, and where nothing was in earlier cycles there may be by now.
-            stint = Stint(solves, enough, needed=True, best=stint.best, spent=stint.spent)
-            anew = searched(prepared, self._backend, timely(), best, None, on_probe=stint)
-            known, above, complete = best, None, anew.complete
-            if anew.curve is not None:
-                made, best = anew, anew.f_ttr
         if not complete:
             self._carried = self._left_of(looked, made.probes, stint.ended, (known, above))
             complete = stint.ended and self._carried is None
@@ -238,6 +231,18 @@ class Watch(Repairer):
                 if stint.ended:
                     self._carried = self._left_of(looked, made.probes, True, (None, rest[2]))
                     complete = self._carried is None
+        least = -np.inf if kept is None else kept[0]
+        least = least if made.f_ttr is None else max(least, made.f_ttr)
+        if on is not None and contiguous and complete and least < enough - INSTANT:
+            # Nothing to wait on comes of it, and where nothing was in earlier cycles there may be by now.
+            stint = Stint(solves, enough, needed=True, best=least, spent=stint.spent)
+            known = least if least >= 0.0 else None
+            anew = searched(prepared, self._backend, timely(), known, None, on_probe=stint)
+            complete = anew.complete
+            if stint.ended:
+                self._carried = self._left_of(looked, anew.probes, True, (known, None))
+                complete = self._carried is None
+            made = made if anew.curve is None else anew
         later = made.f_ttr is not None and (kept is None or made.f_ttr > kept[0])
         if made.curve is not None and made.f_ttr is not None and later:
             self._kept = KeptRepair(made.curve, made.f_ttr, looked.now, prepared.scene.frame)
