@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from repair.world.advance import FINEST, Motion, circle_left, first_touch, rectangle_left
-from repair.world.polygons import polygons_left
+from repair.world.advance import FINEST, Motion, circle_left, first_touch, polygons_left, rectangle_left
 
 HALF = complex(2.0, 1.0)
 number = st.floats(-1.0, 1.0)

@@ -143,16 +143,28 @@ class Blind(Soft):
         return SolveResult(SolveStatus.INFEASIBLE)
 
 
+class Free(Soft):
+    """Finds a curve by its own way."""
+
+    capabilities = Capabilities(own_way=True)
+
+
 @pytest.mark.parametrize(
-    "helper, asked",
-    [(lambda: Blind(own_way=True), False), (lambda: Blind(own_way=False), True), (Soft, True), (None, True)],
-    ids=["own way, nothing", "shown way, nothing", "a curve", "nobody"],
+    "helper, latest, asked",
+    [
+        (lambda: Blind(own_way=True), 1.2, False),
+        (lambda: Blind(own_way=False), 1.2, True),
+        (Free, -1.0, True),  # smaller margins may do what just misses
+        (Soft, 1.2, True),
+        (None, 1.2, True),
+    ],
+    ids=["own way, nothing", "shown way, nothing", "own way, refused", "a curve", "nobody"],
 )
-def test_other_margins_are_not_asked_for_where_somebody_has_looked_everywhere(helper, asked):
+def test_other_margins_are_not_asked_for_where_somebody_has_looked_everywhere(helper, latest, asked):
     source = Laddered()
     helpers = {} if helper is None else {"helper": helper}
     backend = Hard(Capabilities(relaxes=True, helpers=helpers), near=False)
-    assert search(backend, source).f_ttr is None
+    assert search(backend, source, latest=latest).f_ttr is None
     assert bool(source.ladder) is asked
 
 

@@ -100,7 +100,8 @@ def _helped(
     -------
     probe : Probe
     nobody : bool
-        A helper that needs no way to be shown has looked among the true shapes, and found nothing.
+        A helper that needs no way to be shown has looked among the true shapes, and found nothing, not even
+        something that the checker refuses.
     """
     nobody = False
     helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
@@ -130,12 +131,12 @@ def _helped_by(
     sides: str,
     budget: Budget,
 ) -> tuple[Probe, bool]:
-    """As :func:`_helped`, of one helper; and whether that has found anything."""
+    """As :func:`_helped`, of one helper; and whether that has found anything, accepted or not."""
     t_rep, can = probe.t_rep, helper.capabilities
     problems = source.without_guide(t_rep) if can.own_way else first
     found = visit(t_rep, problems, source, helper, checker, sides, None, budget)
     if not found.feasible or found.solve.curve is None:
-        return probe, False
+        return probe, found.solve.curve is not None
     along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD, jumps=can.jumps)
     curve = found.solve.curve
     again = probe_one(t_rep, along, backend, checker, curve, budget)
