@@ -214,6 +214,19 @@ class Broken:
         return self.change(found)
 
 
+class Unreadable:
+    """A curve that does not say when it begins."""
+
+    t_end = 9.0
+
+    @property
+    def t_start(self):
+        raise ZeroDivisionError("oh")
+
+    def sample(self, t):
+        return None
+
+
 def _hole(found):
     position = found.position.copy()
     position[-1] = np.nan
@@ -235,6 +248,7 @@ ANSWERS = {
     "gave a dict": lambda answer, problem: {},
     "no SolveStatus": lambda answer, problem: replace(answer, status="solved"),
     "as its curve": lambda answer, problem: replace(answer, curve=np.zeros(3)),
+    "as its curve, which needs t_start": lambda answer, problem: replace(answer, curve=Unreadable()),
     "not finite": lambda answer, problem: replace(answer, curve=Broken(answer.curve, _hole)),
     "was asked for": _short,
     "FrenetTrajectory": lambda answer, problem: replace(

@@ -70,10 +70,18 @@ class Curve(Protocol):
 
 
 def is_curve(thing: Any) -> TypeGuard[Curve]:
-    """The same as ``isinstance(thing, Curve)``, without the time that a protocol takes to be asked."""
-    return (
-        hasattr(thing, "t_start") and hasattr(thing, "t_end") and getattr(thing, "sample", None) is not None
-    )
+    """The same as ``isinstance(thing, Curve)``, without the time that a protocol takes to be asked.
+
+    What does not let its attributes be read is none.
+    """
+    try:
+        return (
+            hasattr(thing, "t_start")
+            and hasattr(thing, "t_end")
+            and getattr(thing, "sample", None) is not None
+        )
+    except Exception:  # of a foreign thing
+        return False
 
 
 @runtime_checkable
