@@ -18,7 +18,6 @@ __all__ = ["ALONG", "FREE", "Plan", "Steps", "first_along", "first_freely"]
 _PEDAL = (0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.4)
 _WHEEL = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.1, 2.4)
 _PARTS = 10  # of a scenario's step at most
-_JOINED = 0.1  # short steps of a scenario are one until then [s]
 _WIDEST = 5.0  # offset of the path that is followed in the end [m]
 
 
@@ -61,7 +60,7 @@ class Steps:
                 # The body stands as it does at the very start, and a path that bends at once would turn it.
                 straight = each if t_rep < INSTANT else first
                 if each == 1 and dt < SHORT * (1.0 - STEP):
-                    joined = steps_until(_JOINED, dt) * dt
+                    joined = steps_until(SHORT, dt) * dt
                     return cls(max(intervals(t_end - t_rep, joined), 1), joined, straight=straight)
                 count = max(intervals(t_end - t_rep, dt / each), 1)
                 return cls(count, dt / each, first, each, straight)
