@@ -137,7 +137,8 @@ def test_nobody_is_asked_for_what_is_proven_too_late():
 
 
 def test_nobody_is_asked_where_a_quick_proof_says_too_late():
-    proof, second, third = TooLate(1.0), Member("second", 9.0), Member("third", 9.0)
+    proof, second = TooLate(1.0), Member("second", 9.0, own_way=True)
+    third = Member("third", 9.0, own_way=True)
     found, _ = asked(Member("first", 0.5), second, third, hopeless=proof)
     assert found.f_ttr == pytest.approx(0.9)
     assert max(second.asked) < 1.0
@@ -149,7 +150,7 @@ def test_nobody_is_asked_where_a_quick_proof_says_too_late():
 
 
 def test_given_visits_that_are_proven_too_late_are_left_out():
-    proof, second = TooLate(0.9), Member("second", 1.1)
+    proof, second = TooLate(0.9), Member("second", 1.1, own_way=True)
     asked(Member("first", 0.4), second, hopeless=proof, visits=(0.2, 0.4, 0.6, 1.0))
     assert second.asked == [0.6]
     assert proof.asked == [0.6, 1.0]
@@ -208,7 +209,7 @@ def test_ctrl_c_while_a_proof_is_looked_for_keeps_what_was_found():
         def __call__(self, t_rep):
             raise KeyboardInterrupt
 
-    last = Member("last", 9.0)
+    last = Member("last", 9.0, own_way=True)
     found, _ = asked(Member("first", 0.5), last, hopeless=Stopped(1.0))
     assert found.f_ttr == pytest.approx(0.5)
     assert not found.complete
@@ -243,17 +244,40 @@ def test_results_name_the_backend_and_are_certified(tmp_path):
     assert [row.name for row in certificate.rows if row.claim and not row.ok] == []
 
 
-def test_a_helper_is_not_asked_again_where_it_found_nothing_as_a_member():
+@pytest.mark.parametrize("rule", ["bisect", "scan"])
+def test_a_helper_is_not_asked_again_where_it_found_nothing_as_a_member(rule):
     """Who was no member, or was not asked for this time, still helps."""
     helpers = {name: Member(name, -1.0) for name in ("cheap", "other")}
     hard = Member("hard", -1.0, helpers={name: lambda one=one: one for name, one in helpers.items()})
     cheap = Member("cheap", 0.5)
-    found, _ = asked(cheap, hard)
+    found, _ = asked(cheap, hard, rule=rule)
     assert found.f_ttr == pytest.approx(0.5)
     refused = {t for t in cheap.asked if t > 0.55}
     assert refused & set(hard.asked)
     assert set(helpers["other"].asked) == set(hard.asked)
     assert set(helpers["cheap"].asked) == set(hard.asked) - refused
+
+
+@pytest.mark.parametrize("rule", ["bisect", "scan"])
+def test_where_feasibility_is_contiguous_a_helper_is_not_asked_after_it_found_nothing(rule):
+    helper = Member("cheap", -1.0)
+    hard = Member("hard", 1.1, helpers={"cheap": lambda: helper})
+    cheap, better = Member("cheap", 0.5), Member("better", 0.9)
+    found, _ = asked(cheap, better, hard, rule=rule)
+    assert found.f_ttr == pytest.approx(1.1)
+    assert max(hard.asked) > 1.15
+    assert helper.asked == []  # by bisection it was asked at 0.6 s and not later, by a scan everywhere
+
+
+def test_no_proof_is_looked_for_where_a_visit_costs_less():
+    """A member without helpers, or whose helpers have all found nothing, begins with the next time left."""
+    for rule, cheap in (("bisect", True), ("scan", False)):
+        for members in ((), (Member("helper", 0.5),)):
+            proof = TooLate(0.9)
+            hard = Member("hard", -1.0, helpers={one.name: lambda one=one: one for one in members})
+            asked(*(members or (Member("first", 0.5),)), hard, rule=rule, hopeless=proof)
+            assert (proof.asked == []) is cheap
+            assert hard.asked[0] == pytest.approx(0.6)
 
 
 def alone(first, *others, **keys):

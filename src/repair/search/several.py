@@ -18,6 +18,7 @@ from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
 from repair.search.probe import Hopeless, ProblemSource
 from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.rules import CONTIGUOUS
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
 from repair.situation import Situation
@@ -80,8 +81,8 @@ def search_with(
         left = None if settings.time_limit is None else max(settings.time_limit - found.wall_time, 0.0)
         again = search_f_ttr(
             around or (situation.unguided if other.capabilities.own_way else situation.source),
-            situation.conflict, _Unaided(other, each, refused), situation.judge,
-            replace(settings, time_limit=left), hopeless=hopeless,
+            situation.conflict, _Unaided(other, each, refused, onward=settings.rule in CONTIGUOUS),
+            situation.judge, replace(settings, time_limit=left), hopeless=hopeless,
             on_probe=None if on_probe is None else partial(_told, on_probe, each),
         )  # fmt: skip
         refused[each] = {probe.t_rep for probe in again.probes}
@@ -103,34 +104,41 @@ class _Unaided(Guarded):
         By which it was asked for.
     refused : mapping of str to collection of float
         At which t_rep [s] a backend found nothing, by its name.
+    onward : bool
+        Whoever found nothing at a t_rep is taken to find nothing at later ones, as a rule does that takes
+        feasibility to be contiguous.
     """
 
-    def __init__(self, backend: RepairBackend, name: str, refused: Mapping[str, Collection[float]]) -> None:
+    def __init__(
+        self, backend: RepairBackend, name: str, refused: Mapping[str, Collection[float]], *, onward: bool
+    ) -> None:
         super().__init__(backend, name)
         helpers = dict(backend.capabilities.helpers)
         for each in helpers.keys() & refused.keys():
-            helpers[each] = partial(_refusing, helpers[each], refused[each])
+            helpers[each] = partial(_refusing, helpers[each], refused[each], onward)
         self.capabilities = replace(backend.capabilities, helpers=helpers)
 
 
 class _Refusing:
     """A backend that is not asked again at some t_rep [s]."""
 
-    def __init__(self, backend: RepairBackend, refused: Collection[float]) -> None:
+    def __init__(self, backend: RepairBackend, refused: Collection[float], onward: bool) -> None:
         self.name, self.capabilities = backend.name, backend.capabilities
         self._backend, self._refused = backend, refused
+        self._from = min(refused, default=math.inf) if onward else math.inf
 
     def solve(
         self, problem: RepairProblem, *, warm_start: Curve | None = None, time_limit: float | None = None
     ) -> SolveResult:
         """Nothing where it has been asked, else what the backend answers."""
-        if any(abs(problem.t_rep - t_rep) <= INSTANT for t_rep in self._refused):
+        t_rep = problem.t_rep
+        if t_rep >= self._from - INSTANT or any(abs(t_rep - each) <= INSTANT for each in self._refused):
             return SolveResult(SolveStatus.INFEASIBLE, detail=f"{self.name} was asked before")
         return self._backend.solve(problem, warm_start=warm_start, time_limit=time_limit)
 
 
-def _refusing(make: Callable[[], RepairBackend], refused: Collection[float]) -> RepairBackend:
-    return _Refusing(make(), refused)
+def _refusing(make: Callable[[], RepairBackend], refused: Collection[float], onward: bool) -> RepairBackend:
+    return _Refusing(make(), refused, onward)
 
 
 def _told(on_probe: Callable[[Probe], None], by: str, probe: Probe) -> None:
@@ -153,8 +161,9 @@ def _search_with(
     def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
         own = situation.unguided if one.capabilities.own_way else situation.source
         return search_f_ttr(
-            around or own, situation.conflict, _Unaided(one, name, refused), situation.judge, settings,
-            visits=visits, on_probe=on_probe if several is None else by(name), after=best, hopeless=hopeless,
+            around or own, situation.conflict, _Unaided(one, name, refused, onward=onward), situation.judge,
+            settings, visits=visits, on_probe=on_probe if several is None else by(name), after=best,
+            hopeless=hopeless if not onward or _slow(one.capabilities, refused) else None,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:
@@ -166,6 +175,7 @@ def _search_with(
         return visited
 
     several, probes, refused = backend.capabilities.members, list[Probe](), dict[str, set[float]]()
+    onward = visits is None and settings.rule in CONTIGUOUS
     if several is None:
         return ask(name, backend, settings, None)
     begin, complete, best = time.perf_counter(), True, None
@@ -175,7 +185,8 @@ def _search_with(
             if late is not None and _open(visits, best, settings, end):
                 end, late = min(end, late()), None
             try:  # an interrupt loses nothing that was found
-                if hopeless is not None and settings.proofs and _open(visits, best, settings, end):
+                slow = not onward or _slow(member.capabilities, refused)
+                if slow and hopeless is not None and settings.proofs and _open(visits, best, settings, end):
                     left = _left(settings, begin)
                     end = min(end, _since(hopeless, _later(visits, best, settings, end), left))
             except KeyboardInterrupt:
@@ -202,6 +213,11 @@ def _search_with(
     return SearchResult(
         SearchStatus.FOUND, situation.conflict, best.t_rep, best.solve.curve, tuple(probes), complete, spent
     )
+
+
+def _slow(can: Capabilities, refused: Collection[str]) -> bool:
+    """Whether a visit of a backend may cost more than a proof: with helpers only before they have refused."""
+    return can.own_way or (can.relaxes and not can.helpers) or not can.helpers.keys() <= set(refused)
 
 
 def _left(settings: SearchConfig, begin: float) -> float | None:
