@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from repair.check.verdict import Reason, Verdict
 from repair.problem.problem import RepairProblem
-from repair.search.probe import Budget, ProblemSource, Rejected, better, words
+from repair.search.probe import Budget, ProblemSource, Rejected, words
 from repair.search.result import Probe
 
 __all__ = ["Notches", "other_ways", "probe_again", "too_close"]
@@ -45,13 +45,14 @@ def probe_again(
     rejected: Rejected,
     source: ProblemSource,
     ask: Callable[[RepairProblem], Probe],
-    sides: str,
     budget: Budget,
 ) -> Probe:
-    """Tighten each side by what the checker missed, again and again, until it passes or nothing is left.
+    """Tighten side after side by what the checker missed, again and again, until one passes.
 
     Backends see boxes and single points of the curve, soft ones may exceed each of them a little; the checker
-    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room.
+    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room. The
+    first side that passes is the answer, whatever ``search.sides`` says: costs of problems that were
+    tightened differently say little about which is better.
 
     Parameters
     ----------
@@ -63,11 +64,9 @@ def probe_again(
         Says by how much.
     ask : callable
         Solves and checks a problem.
-    sides : str
-        ``search.sides``.
     budget : Budget
     """
-    best, tried = probe, list(probe.tried)
+    tried = list(probe.tried)
     for problem, first in rejected:
         verdict, taken = first, Notches()
         while not verdict.ok:
@@ -77,15 +76,13 @@ def probe_again(
                 break
             if budget.spent:
                 budget.cut = True
-                return replace(best, tried=tuple(tried))
+                return replace(probe, tried=tuple(tried))
             again = ask(problem.tightened(*amounts))
             tried.append(f"{words(again)} ({_said(*amounts)})")
             verdict, taken = again.verdict, further
-            if again.feasible and better(again, best):
-                best = again
-        if best.feasible and sides == "first":
-            break
-    return replace(best, tried=tuple(tried))
+            if again.feasible:
+                return replace(again, tried=tuple(tried))
+    return replace(probe, tried=tuple(tried))
 
 
 def too_close(rejected: Rejected) -> bool:

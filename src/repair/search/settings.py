@@ -39,7 +39,8 @@ class SearchConfig:
     )
     sides: str = setting(
         "best",
-        "best: every open side of passing is tried; first: the first feasible one",
+        "best: of the open sides of passing that one whose repair costs least, and where each has to be "
+        "tightened the first that passes; first: the first feasible one",
         choices=("best", "first"),
     )
     proofs: bool = setting(

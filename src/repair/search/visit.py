@@ -40,7 +40,7 @@ def visit(
     if tightens:
         probe = probe_again(
             probe, rejected, source,
-            lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), sides, budget,
+            lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), budget,
         )  # fmt: skip
     nobody = False
     try:
@@ -143,7 +143,7 @@ def _helped_by(
     if not again.feasible and any(source.notches):
         again = probe_again(
             again, [(along, again.verdict)], source,
-            lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), sides, budget,
+            lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), budget,
         )  # fmt: skip
     said = f"from a curve of {helper.name} that passes every check"
     tried = (*probe.tried, f"{words(again)} ({said})")
