@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from repair.arrays import wrap
 from repair.config.simulate import SimulateConfig
 from repair.errors import ConfigError, RepairError
 from repair.reference.profile import SpeedProfile
 from repair.report.loop.table import interval, summary, table_of
-from repair.scene.road.lanes import Lane
+from repair.scene.road.lanes import Lane, locate
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.rows import rigid_outline
 from repair.simulate.contact import first_struck, least_distance
@@ -25,6 +26,7 @@ from repair.simulate.many.run import Simulation, drives_in, tasks_of
 from repair.simulate.measures import SIMULATION, row_of
 from repair.simulate.near import anybody_near, within_reach
 from repair.simulate.policies.registry import POLICIES, make_policy
+from repair.simulate.predictions.network import Network
 from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
 from repair.simulate.watch import Found
 from repair.simulate.world import Beliefs, World, displaced, widened
@@ -105,6 +107,33 @@ def test_lanelets_are_followed_and_the_straighter_one_of_two():
     assert speeds.max() < 10.3
 
 
+@given(seed=st.integers(0, 9999))
+@settings(max_examples=40)
+def test_the_lanelet_that_somebody_is_on_is_the_nearest_of_those_that_lead_there(seed):
+    rng = np.random.default_rng(seed)
+    lanes = {
+        k: lane(k, np.cumsum(rng.normal((3.0, 0.0), 1.5, (rng.integers(2, 9), 2)), axis=0), [k + 1])
+        for k in range(1, 9)
+    }
+    network, point, heading = Network(lanes), rng.uniform((0.0, -6.0), (20.0, 6.0)), rng.uniform(-2.0, 2.0)
+    places = {k: locate(one.center, point) for k, one in lanes.items()}
+    leads = {k: place for k, place in places.items() if abs(wrap(place[2] - heading)) < 0.9}
+    nearest = min(leads, key=lambda k: abs(leads[k][1]), default=None)
+    found = network.beside(point, heading, 3.0, 0.9)
+    if nearest is None or abs(leads[nearest][1]) >= 3.0:
+        assert found is None
+    else:
+        assert found == (lanes[nearest], *leads[nearest][:2])
+    # Along three of them, however far was asked for before
+    for until in rng.permutation([0.0, 10.0, 50.0, 12.0]):
+        way = network.way(lanes[1], until)
+        expected, last = lanes[1].center, 1
+        while sum(lanes[k].length for k in range(1, last + 1)) < until and last < 8:
+            last += 1
+            expected = np.concatenate([expected, lanes[last].center])
+        np.testing.assert_array_equal(way.line, expected)
+
+
 @given(
     name=st.sampled_from(["constant_velocity", "constant_turn", "lane"]),
     step=st.integers(1, 40), seed=st.integers(0, 99),
@@ -167,6 +196,21 @@ def test_who_is_displaced_is_ahead_or_behind_and_who_stands_stays():
     assert ahead.states[20, 0] == pytest.approx(16.0 + 2.0)
     assert behind.states[20, 0] == pytest.approx(16.0 - 2.0)
     assert ahead.states[0, 0] == behind.states[0, 0] == 0.0
+
+
+@given(seed=st.integers(0, 9999))
+@settings(max_examples=50)
+def test_who_comes_near_is_seen_with_the_others_and_alone(seed):
+    rng = np.random.default_rng(seed)
+    cars = [
+        body(straight(*rng.uniform(-60.0, 90.0, 2), rng.uniform(0.0, 6.0), rng.uniform(0.0, 20.0)), half)
+        for half in ((2.2, 0.9), (6.0, 1.2), (2.2, 0.9))
+    ]
+    gone = body(np.where(np.arange(61)[:, None] < 30, straight(5.0, v=10.0), np.nan))
+    ego = straight(rng.uniform(-5.0, 5.0), heading=rng.uniform(0.0, 6.0))[:50, :3]
+    for some in (cars, [*cars, gone]):
+        alone = [anybody_near([one], ego, VEHICLE, 0.5) for one in some]
+        assert anybody_near(some, ego, VEHICLE, 0.5) == any(alone)
 
 
 # -- curves -----------------------------------------------------------------------------------------

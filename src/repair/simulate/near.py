@@ -17,17 +17,27 @@ _ASIDE = 12.0  # who stays farther from the path is met on no way around anybody
 
 def within_reach(obstacles: Iterable[Obstacle], path: Array) -> tuple[Obstacle, ...]:
     """Those who come near a path (P, 2) [m] at any time: nobody else is met on it, or on the way around."""
-    low, high, way = path.min(axis=0), path.max(axis=0), path[:, 0] + 1j * path[:, 1]
+    (low_x, low_y), (high_x, high_y) = path.min(axis=0).tolist(), path.max(axis=0).tolist()
+    way_x, way_y = np.ascontiguousarray(path.T)
     kept = []
     for one in obstacles:
-        there = one.states[np.isfinite(one.states[:, 0]), :2]
-        if one.polygons or not len(there):
+        x, y = one.states[:, 0], one.states[:, 1]
+        there = np.isfinite(x)
+        if not there.all():
+            x, y = x[there], y[there]
+        if one.polygons or not len(x):
             kept.append(one)
             continue
-        outline = one.vertices[np.isfinite(one.vertices[:, 0, 0])][0]
-        reach = _ASIDE + float(np.hypot(*(outline - there[0]).T).max())
-        beside = there[((there >= low - reach) & (there <= high + reach)).all(axis=1)]  # others are farther
-        if len(beside) and np.abs((beside[:, 0] + 1j * beside[:, 1])[:, None] - way).min() <= reach:
+        outline = one.vertices[int(np.isfinite(one.vertices[:, 0, 0]).argmax())]
+        reach = _ASIDE + float(np.hypot(outline[:, 0] - x[0], outline[:, 1] - y[0]).max())
+        beside = (x >= low_x - reach) & (x <= high_x + reach) & (y >= low_y - reach) & (y <= high_y + reach)
+        if not beside.any():  # the others are farther
+            continue
+        apart_x, apart_y = x[beside][:, None] - way_x, y[beside][:, None] - way_y
+        apart_x *= apart_x
+        apart_y *= apart_y
+        apart_x += apart_y
+        if apart_x.min() <= reach * reach:
             kept.append(one)
     return tuple(kept)
 
@@ -45,25 +55,29 @@ def anybody_near(obstacles: Iterable[Obstacle], ego: Array, vehicle: Vehicle, ma
     margin : float
         [m].
     """
+    alike: dict[tuple[int, ...], list[Array]] = {}
+    for one in obstacles:
+        alike.setdefault(one.vertices.shape, []).append(one.vertices)
+    return any(_met(np.array(outlines), ego, vehicle, margin) for outlines in alike.values())
+
+
+def _met(outlines: Array, ego: Array, vehicle: Vehicle, margin: float) -> bool:
+    """Whether one of some outlines (N, T, V, 2) is met."""
     own = np.append(np.hypot(*np.diff(ego[:, :2], axis=0).T), 0.0)
     own[1:] = np.maximum(own[1:], own[:-1])
-    cos, sin = np.cos(ego[:, 2, None]), np.sin(ego[:, 2, None])
-    for one in obstacles:
-        count = min(len(ego), len(one.vertices))
-        corners = one.vertices[:count]
-        step = np.zeros(count)
-        if count > 1:
-            far = np.nan_to_num(np.abs(np.diff(corners, axis=0)).max(axis=(1, 2), initial=0.0)) * 1.5
-            step[:-1], step[1:] = far, np.maximum(far, np.append(far[1:], 0.0))
-        room = margin + own[:count] + step
-        x, y = (corners[..., k] - ego[:count, k, None] for k in (0, 1))
-        along, aside = cos[:count] * x + sin[:count] * y, cos[:count] * y - sin[:count] * x
-        a, b = vehicle.half_length + room, vehicle.half_width + room
-        with np.errstate(invalid="ignore"):
-            met = (
-                (along.max(axis=1) >= -a) & (along.min(axis=1) <= a)
-                & (aside.max(axis=1) >= -b) & (aside.min(axis=1) <= b)
-            )  # fmt: skip
-        if met.any():
-            return True
-    return False
+    count = min(len(ego), outlines.shape[1])
+    corners = np.ascontiguousarray(outlines[:, :count].transpose(2, 3, 0, 1))  # extremes over long rows
+    moved = np.abs(corners[..., 1:] - corners[..., :-1]).max(axis=(0, 1), initial=0.0)
+    far = np.zeros((outlines.shape[0], count + 1))
+    far[:, 1:-1] = np.nan_to_num(moved) * 1.5
+    room = margin + own[:count] + np.maximum(far[:, 1:], far[:, :-1])
+    cos, sin = np.cos(ego[:count, 2]), np.sin(ego[:count, 2])
+    x, y = corners[:, 0] - ego[:count, 0], corners[:, 1] - ego[:count, 1]
+    along, aside = cos * x + sin * y, cos * y - sin * x
+    a, b = vehicle.half_length + room, vehicle.half_width + room
+    with np.errstate(invalid="ignore"):
+        met = (
+            (along.max(axis=0) >= -a) & (along.min(axis=0) <= a)
+            & (aside.max(axis=0) >= -b) & (aside.min(axis=0) <= b)
+        )  # fmt: skip
+    return bool(met.any())

@@ -19,6 +19,7 @@ from repair.simulate.data import Driven
 from repair.simulate.drive import drive
 from repair.simulate.eyes import Grounds
 from repair.simulate.policies.registry import make_policy
+from repair.simulate.predictions.network import Network
 from repair.simulate.predictions.registry import make_predictor
 from repair.simulate.watch import Watch
 from repair.simulate.world import Beliefs, World
@@ -179,7 +180,7 @@ def case_at(plan: Plan, config: Config, shift: float) -> Case | str:
     n_steps = min(plan.n_steps, scene.n_steps - by)
     if n_steps * scene.dt < _LEAST - 1e-9:
         return f"there is less than {_LEAST:g} s to drive"
-    lanes = lanes_of(scene.scenario.lanelet_network)[0]
+    lanes = Network(lanes_of(scene.scenario.lanelet_network)[0])
     world = World(scene.obstacles, scene.dt, n_steps, by, lanes)
     grounds = _grounds(plan, world, config, "constant_velocity")
     never = drive(grounds, plan.prepared.reference, make_policy("never", config.simulate))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -83,7 +84,12 @@ def motion_of(past: Obstacle, dt: float) -> tuple[Array, float, float]:
             along = float(np.arctan2(step[1], step[0]))
             heading = heading if np.isfinite(heading) else along
             speed = float(step @ (np.cos(heading), np.sin(heading))) / dt
-    return np.array([x, y]), float(np.nan_to_num(heading)), float(np.nan_to_num(speed))
+    return np.array([x, y]), _number(heading), _number(speed)
+
+
+def _number(value: float) -> float:
+    """As ``np.nan_to_num``, of one number."""
+    return value if math.isfinite(value) else float(np.nan_to_num(value))
 
 
 def moved(past: Obstacle, centres: Array, turned: Array, dt: float) -> Obstacle:
@@ -101,36 +107,41 @@ def moved(past: Obstacle, centres: Array, turned: Array, dt: float) -> Obstacle:
         [s].
     """
     pivot = past.states[-1, :2]
-    cos, sin = np.cos(turned), np.sin(turned)
-    turns = bool(turned.any())
+    cos, sin, turns = np.cos(turned)[:, None], np.sin(turned)[:, None], bool(turned.any())
 
     def placed(points: Any) -> Array:
         """Points (V, 2) at all times (T, V, 2)."""
         local = np.asarray(points) - pivot
         if not turns:
             return np.asarray(local + centres[:, None])
-        x, y = local.T
-        at = np.stack([cos[:, None] * x - sin[:, None] * y, sin[:, None] * x + cos[:, None] * y], axis=-1)
-        return np.asarray(at + centres[:, None])
+        (x, y), at = local.T, np.empty((len(turned), len(local), 2))
+        at[..., 0], at[..., 1] = cos * x - sin * y, sin * x + cos * y
+        at += centres[:, None]
+        return at
 
     rectangles = circles = None
     if past.rectangles is not None:
-        x, y, heading, length, width = past.rectangles[-1]
-        rectangles = np.column_stack([
-            placed([[x, y]])[:, 0], heading + turned, np.tile([length, width], (len(turned), 1))
-        ])  # fmt: skip
+        rectangles = np.empty((len(turned), 5))
+        rectangles[:, :2] = placed(past.rectangles[-1:, :2])[:, 0]
+        rectangles[:, 2] = past.rectangles[-1, 2] + turned
+        rectangles[:, 3:] = past.rectangles[-1, 3:]
     if past.circles is not None:
-        x, y, radius = past.circles[-1]
-        circles = np.column_stack([placed([[x, y]])[:, 0], np.full(len(turned), radius)])
+        circles = np.empty((len(turned), 3))
+        circles[:, :2] = placed(past.circles[-1:, :2])[:, 0]
+        circles[:, 2] = past.circles[-1, 2]
     polygons: tuple[tuple[Array, ...], ...] = ()
     if past.polygons:
         parts = [placed(part) for part in past.polygons[-1]]
         polygons = tuple(tuple(frozen(part[k]) for part in parts) for k in range(len(turned)))
-    steps = np.hypot(*np.diff(centres, axis=0).T) / dt if len(centres) > 1 else np.zeros(0)
-    speed = np.append(steps, steps[-1:] if len(steps) else 0.0)
-    states = np.column_stack([centres, np.nan_to_num(past.states[-1, 2]) + turned, speed])
+    states = np.empty((len(turned), 4))
+    states[:, :2], states[:, 2] = centres, _number(past.states.item(-1, 2)) + turned
+    steps = np.hypot(*(centres[1:] - centres[:-1]).T) / dt
+    states[:-1, 3], states[-1, 3] = steps, steps[-1] if len(steps) else 0.0
+    made = placed(past.vertices[-1])
+    for table in (made, rectangles, circles, states):
+        if table is not None:
+            table.setflags(write=False)
     return replace(
-        past, role="dynamic", late=0, vertices=frozen(placed(past.vertices[-1])),
-        rectangles=None if rectangles is None else frozen(rectangles),
-        circles=None if circles is None else frozen(circles), polygons=polygons, states=frozen(states),
+        past, role="dynamic", late=0, vertices=made, rectangles=rectangles, circles=circles,
+        polygons=polygons, states=states,
     )  # fmt: skip
