@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -127,3 +128,25 @@ def test_the_corridor_settles_places_and_changes_no_end(tmp_path: Path) -> None:
     plain, quick = dead_ends(*asked), dead_ends(*asked, checker.edge.corridor)
     assert len(plain) == 1
     np.testing.assert_array_equal(quick, plain)
+
+
+def test_the_way_around_an_end_is_the_nearest_that_is_free_all_along(tmp_path: Path) -> None:
+    road = roads.strip(1, straight(-50.0, 50.0), more='<adjacentLeft ref="2" drivingDir="same"/>')
+    road += roads.strip(2, straight(-50.0, 50.0, 4.0), after=[3],
+                        more='<adjacentRight ref="1" drivingDir="same"/>')  # fmt: skip
+    road += roads.strip(3, straight(50.0, 300.0, 4.0), before=[2])
+    scene = loaded(tmp_path, road, 12.0, 8.0)
+    edge = answer(scene, "ego").prepared.checker.road
+    start = float(scene.start[0, 0])
+    room = SimpleNamespace(at=lambda s: np.stack([np.full(len(s), -7.0), np.full(len(s), 7.0)]))
+    ((lower, upper),) = dead_ends(edge, scene.frame, scene.vehicle, room, start, 80.0)
+    s = np.arange(lower[0] + 0.6, start + 80.0, 0.25)
+
+    def free(aside: float) -> bool:
+        places = scene.frame.to_cartesian(s, np.full(len(s), aside))
+        return bool(edge.inside(edge.outline(*places.T, scene.frame.heading(s))).all())
+
+    assert free(upper[1])
+    assert not free(upper[1] - 0.2)
+    assert lower[1] == -1e4
+    assert not any(free(-aside) for aside in np.arange(0.2, 3.0, 0.2))

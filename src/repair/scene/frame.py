@@ -108,8 +108,8 @@ class FrenetFrame:
 
     # ------------------------------------------------------------------ evaluation
 
-    def _locate(self, s: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array, Array]:
-        """Segment of each ``s`` (...), the way into it (...), its coefficients (4, 2, ...)."""
+    def pieces_at(self, s: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array, Array]:
+        """Piece of each ``s`` (...), the way into it (...), coefficients (4, 2, ...), the cubic one first."""
         query = np.asarray(s, dtype=np.float64)
         # fmax/fmin send NaN to segment 0; the offset stays NaN and so does the result
         # and what is not negative is rounded down by the cast
@@ -120,7 +120,7 @@ class FrenetFrame:
 
     def _derivatives(self, s: npt.ArrayLike, highest: int) -> list[Array]:
         """Position and derivatives by s up to ``highest``, each (2, ...)."""
-        _, u, (c3, c2, c1, c0) = self._locate(s)
+        _, u, (c3, c2, c1, c0) = self.pieces_at(s)
         found = [((c3 * u + c2) * u + c1) * u + c0]
         if highest >= 1:
             found.append((3.0 * c3 * u + 2.0 * c2) * u + c1)
@@ -136,7 +136,7 @@ class FrenetFrame:
 
     def heading(self, s: npt.ArrayLike) -> Array:
         """Continuous heading [rad] at ``s``."""
-        index, u, (c3, c2, c1, _) = self._locate(s)
+        index, u, (c3, c2, c1, _) = self.pieces_at(s)
         x1, y1 = (3.0 * c3 * u + 2.0 * c2) * u + c1
         return self._continuous(np.arctan2(y1, x1), index)
 
@@ -213,9 +213,13 @@ class FrenetFrame:
             result[usable] = self._project(flat[usable], hint)
         return result.reshape(query.shape)
 
+    def nearest(self, points: Array) -> npt.NDArray[np.intp]:
+        """Which of the tabulated points are nearest to others (N, 2)."""
+        return np.asarray(self._tree.query(points)[1], dtype=np.intp)
+
     def _nearest(self, flat: Array, hint: Array | None) -> Array:
         if hint is None:
-            index = np.asarray(self._tree.query(flat)[1])
+            index = self.nearest(flat)
         else:
             window = np.arange(-60, 61)
             around = np.rint(np.nan_to_num(hint) * self._inverse).astype(np.intp)[:, None] + window
@@ -280,7 +284,7 @@ class FrenetFrame:
         motion : (4, K) array
         """
         s, l, s_rate, l_rate = motion  # noqa: E741
-        index, way, (c3, c2, c1, c0) = self._locate(s)
+        index, way, (c3, c2, c1, c0) = self.pieces_at(s)
         u = np.empty((2, len(s)))  # rows of the same length need no broadcasting
         u[:] = way
         # Horner's scheme, which gives the derivatives as well

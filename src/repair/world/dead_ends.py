@@ -35,6 +35,7 @@ _BEFORE = 6.0  # the last place that is on the road is looked for so far before 
 _OVER = 0.05  # who is over the edge by less is not stopped: how the body is turned there is not known yet [m]
 _FAR = 1e4  # where the road never goes on [m]
 _SEEN = 60.0  # how much of a part off the road is looked at sideways [m]
+_SOME = 50  # of the fine places at a time
 
 _Inside = Callable[..., npt.NDArray[np.bool_]]
 
@@ -74,10 +75,18 @@ def dead_ends(
     def inside(s: Array, l: Array, over: float = 0.0) -> npt.NDArray[np.bool_]:  # noqa: E741
         body = vehicle.corners - over * np.sign(vehicle.corners)
         centre, orientation = poses(s, l)
-        turn = np.exp(1j * orientation)
-        corners = centre[:, None] + turn[:, None] * (body[:, 0] + 1j * body[:, 1])
-        return road.inside(np.stack([corners.real, corners.imag], axis=2))
+        # Beyond all of the road nobody is on it.
+        x, y = centre.real, centre.imag
+        found: npt.NDArray[np.bool_] = (x >= low_x) & (x <= high_x)
+        found &= (y >= low_y) & (y <= high_y)
+        near = np.flatnonzero(found)
+        if len(near):
+            turn = np.exp(1j * orientation[near])
+            corners = centre[near, None] + turn[:, None] * (body[:, 0] + 1j * body[:, 1])
+            found[near] = road.inside(np.stack([corners.real, corners.imag], axis=2))
+        return found
 
+    low_x, low_y, high_x, high_y = road.region.bounds
     s = start + np.arange(0.0, ahead + _COARSE, _COARSE)
     axis = np.zeros(len(s))
     on = np.zeros(len(s), dtype=np.bool_) if corridor is None else corridor.holds(s, *poses(s, axis))
@@ -91,13 +100,23 @@ def dead_ends(
         again = np.flatnonzero(on[k + 1 :])
         last = k + 1 + int(again[0]) if len(again) else len(s) - 1
         fine = np.arange(max(s[k] - _BEFORE, start), s[k + 1], _FINE)
-        whole = np.flatnonzero(inside(fine, np.zeros(len(fine))))
-        wall = float(fine[whole[-1]]) if len(whole) else float(s[k])
+        wall = _last_inside(inside, fine)
+        wall = float(s[k]) if wall is None else wall
         left = _open_side(inside, wall, float(s[last]), room, 1.0)
         right = _open_side(inside, wall, float(s[last]), room, -1.0)
         beyond = float(s[last]) + _SPARE if len(again) else _FAR
         found.append((np.array([wall - _SPARE, right]), np.array([beyond, left])))
     return found
+
+
+def _last_inside(inside: _Inside, s: Array) -> float | None:
+    """The last of some places of the path at which the ego is on the road; mostly it is one of the last."""
+    for end in range(len(s), 0, -_SOME):
+        part = s[max(end - _SOME, 0) : end]
+        whole = np.flatnonzero(inside(part, np.zeros(len(part))))
+        if len(whole):
+            return float(part[whole[-1]])
+    return None
 
 
 def _open_side(inside: _Inside, first: float, last: float, room: LateralBounds, sign: float) -> float:
@@ -107,9 +126,18 @@ def _open_side(inside: _Inside, first: float, last: float, room: LateralBounds, 
     aside = np.arange(_SIDEWAYS, float(bounds.max(initial=0.0)) + _SIDEWAYS, _SIDEWAYS)
     if not len(aside):
         return sign * _FAR
-    places = np.meshgrid(s, sign * aside, indexing="ij")
-    free = inside(*(column.ravel() for column in places)).reshape(len(s), -1).all(axis=0)
-    return sign * (float(aside[np.argmax(free)]) if free.any() else _FAR)
+    # Most offsets fail at one of a few places, and of those that are left the first mostly is free.
+    open_ = np.arange(len(aside))
+    for at in (s[-1], s[0], s[len(s) // 2]):
+        open_ = open_[inside(np.full(len(open_), at), sign * aside[open_])]
+        if not len(open_):
+            return sign * _FAR
+    for some in (open_[:1], open_[1:5], open_[5:]):
+        places = np.meshgrid(s, sign * aside[some], indexing="ij")
+        free = inside(*(column.ravel() for column in places)).reshape(len(s), len(some)).all(axis=0)
+        if free.any():
+            return sign * float(aside[some[np.argmax(free)]])
+    return sign * _FAR
 
 
 def with_boxes(occupancy: Occupancy, boxes: list[tuple[Array, Array]]) -> Occupancy:

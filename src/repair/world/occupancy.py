@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, frozen, names
 from repair.curves.base import FrenetTrajectory
-from repair.scene.road.beside import to_frenet_from
+from repair.scene.road.beside import to_frenet_around
 from repair.scene.road.passes import every_pass, passes
 from repair.timegrid import INSTANT
 from repair.world.boxes import Occupancy
@@ -182,7 +182,8 @@ def _box(points: Array, inflate: Array) -> tuple[Array, Array, npt.NDArray[np.bo
     """
     known = np.isfinite(points[..., 0]) & np.isfinite(points[..., 1])
     whole = np.asarray(known.all(axis=1))
-    lower, upper = points.min(axis=1) - inflate, points.max(axis=1) + inflate
+    by_point = np.ascontiguousarray(points.transpose(1, 0, 2))  # extremes over long rows
+    lower, upper = by_point.min(axis=0) - inflate, by_point.max(axis=0) + inflate
     part = known.any(axis=1) & ~whole
     if part.any():
         masked = np.where(known[part][..., None], points[part], np.nan)
@@ -202,15 +203,14 @@ def _boxes(
     alike: dict[int, list[int]] = {}
     for j, one in enumerate(looked):
         alike.setdefault(one.outline.shape[1], []).append(j)
-    order = [j for rows in alike.values() for j in rows]
-    if not order:
+    if not alike:
         return
-    stacked = np.concatenate([looked[j].outline.reshape(-1, 2) for j in order])
+    outlines = [np.concatenate([looked[j].outline for j in rows]) for rows in alike.values()]
+    stacked = np.concatenate([some.reshape(-1, 2) for some in outlines])
     if often and len(passes(frame)) == 1:
-        middles = [looked[j].outline.mean(axis=1) for j in order]
-        at = frame.to_frenet(np.concatenate(middles))[:, 0]
-        points = np.repeat([looked[j].outline.shape[1] for j in order], [len(one) for one in middles])
-        projected = [to_frenet_from(frame, stacked, at.repeat(points))]
+        middles = np.concatenate([some.mean(axis=1) for some in outlines])
+        points = np.repeat([some.shape[1] for some in outlines], [len(some) for some in outlines])
+        projected = [to_frenet_around(frame, stacked, middles, points)]
     else:
         projected = every_pass(frame, stacked)
     for found in projected:
