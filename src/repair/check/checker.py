@@ -126,11 +126,7 @@ class Checker:
         Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked. Where
         the vehicle stands there, from the last step on at which it does not.
         """
-        n, step = self.config.substeps, steps_until(problem.t_rep, self.scene.dt) - 1
-        first = self._kept(problem.reference, problem.t_end).moving(step, n) if step > 0 else 0
-        times = self.times(problem.t_end)
-        after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
-        path, s, slip0 = self._spliced(problem, after, times, first)
+        first, after, path, s, slip0 = self._spliced(problem, curve)
         if not is_finite(path):
             return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
         slip, orientation = self.scene.model.angles(path, slip0)
@@ -150,6 +146,15 @@ class Checker:
             found += self._turned_at_start(problem, float(orientation[0]))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
+
+    def refuses_traffic(self, problem: RepairProblem, curve: Curve) -> Violation | None:
+        """What :meth:`check` would say of the traffic alone; a curve that is not finite meets nobody."""
+        first, _, path, _, slip0 = self._spliced(problem, curve)
+        if not is_finite(path):
+            return None
+        _, orientation = self.scene.model.angles(path, slip0)
+        centre = path.xy.view(np.complex128)[:, 0]
+        return self._met(centre, orientation, first, path.longest, problem.t_rep)[0]
 
     def _over_a_gap(self, problem: RepairProblem, path: CartesianPath, orientation: Array) -> list[Violation]:
         """A gap of the map that is no road for CommonRoad's own check, where the reference crosses none."""
@@ -227,13 +232,17 @@ class Checker:
         return kept
 
     def _spliced(
-        self, problem: RepairProblem, after: FrenetTrajectory, times: Array, first: int
-    ) -> tuple[CartesianPath, Array, float | None]:
-        """The reference from dense sample ``first`` on, then ``after``.
+        self, problem: RepairProblem, curve: Curve
+    ) -> tuple[int, FrenetTrajectory, CartesianPath, Array, float | None]:
+        """The reference from dense sample ``first`` on, then the curve's samples ``after`` it.
 
-        Also the arc lengths, and the slip angle to begin with; at the start there is no history and no
-        slip angle (None).
+        Also the path of both, the arc lengths, and the slip angle to begin with; at the start there is no
+        history and no slip angle (None).
         """
+        n, step = self.config.substeps, steps_until(problem.t_rep, self.scene.dt) - 1
+        first = self._kept(problem.reference, problem.t_end).moving(step, n) if step > 0 else 0
+        times = self.times(problem.t_end)
+        after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
         late, slip0 = len(times) - len(after), None
         motion = motion_of(after, len(times) - first)
         if late:
@@ -241,7 +250,7 @@ class Checker:
             motion[:, : late - first] = kept.motion[:, first:late]
             slip0 = None if first == 0 else float(kept.slip[first])
         path = self.scene.frame.carry(times[first:], motion)
-        return path, motion[0], self._standing(path) if first == 0 else slip0
+        return first, after, path, motion[0], self._standing(path) if first == 0 else slip0
 
     def _standing(self, path: CartesianPath) -> float | None:
         """Slip angle at t = 0 where the body's orientation is known; None for that of steady driving.

@@ -15,7 +15,7 @@ from repair.curves.plane import STANDSTILL
 from repair.deadline import in_time
 from repair.problem.problem import RepairProblem
 from repair.terminal.family import Trial, stops_from
-from repair.terminal.traffic import extended, traffic_until
+from repair.terminal.traffic import LastSteps, extended, traffic_until
 from repair.terminal.verdict import Continuation, Ending, Terminal
 from repair.timegrid import INSTANT, steps_until
 
@@ -52,6 +52,7 @@ class EndJudge:
     def __init__(self, checker: Checker, source: ProblemFactory) -> None:
         self.checker, self.source = checker, source
         self._made: _Judges | None = None
+        self._ends = LastSteps(checker.scene)
 
     def __call__(self, driven: Curve, t_end: float, *, thorough: bool = True) -> Terminal:
         """How what is driven until ``t_end`` ends.
@@ -83,14 +84,14 @@ class EndJudge:
             judges = self._until(trial.stop.t_end)
             problem = self._problem(driven, moving, trial.stop.t_end)
             whole = trial.stop if moving == t_end else SplicedCurve(driven, trial.stop, t_end)
+            # Only the first stop's verdict is told; of the others most meet somebody, which is seen soonest.
+            if first is not None and judges.known.refuses_traffic(problem, whole) is not None:
+                continue
             verdict = judges.known.check(problem, whole)
             if not verdict.ok:
                 first = first or (trial, verdict)
                 continue
-            beyond = {
-                how: next(iter(judge.check(problem, whole).violations), None)
-                for how, judge in judges.extended.items()
-            }
+            beyond = {how: _refused(judge, problem, whole) for how, judge in judges.extended.items()}
             safe = not any(beyond.values())
             ending = Ending.SAFE if safe else Ending.SAFE_UNLESS_EXTENDED
             found = Terminal(ending, self._driven(driven, trial, t_end), beyond, (), tried)
@@ -130,13 +131,13 @@ class EndJudge:
             n_steps = max(scene.n_steps, needed, steps_until(self.source.t_end, scene.dt) + ahead)
             config = replace(checker.config, margin=False, gaps="always")
 
-            known = traffic_until(scene, n_steps)
+            known = traffic_until(scene, n_steps, self._ends)
 
             def judge(obstacles: tuple[Obstacle, ...]) -> Checker:
                 later = replace(scene, n_steps=n_steps, horizon=n_steps * scene.dt, obstacles=obstacles)
                 return Checker(later, checker.limits, config, checker.reference_limits, like=checker)
 
-            others = {how: judge(extended(scene, known, n_steps, how)) for how in EXTENSIONS}
+            others = {how: judge(extended(scene, known, n_steps, how, self._ends)) for how in EXTENSIONS}
             self._made = _Judges(n_steps, judge(known), others)
         return self._made
 
@@ -144,6 +145,13 @@ class EndJudge:
         """The vehicle at the scenario's steps from the last state of the repair on."""
         states = self.drive(SplicedCurve(driven, trial.stop, t_end), trial.stop.t_end)
         return Continuation(trial.maneuver, trial.stop, states.since(t_end - INSTANT))
+
+
+def _refused(judge: Checker, problem: RepairProblem, curve: Curve) -> Violation | None:
+    """Why a curve is refused that passes every check but for other traffic."""
+    if judge.config.extra:  # a check of one's own may look at the traffic as well
+        return next(iter(judge.check(problem, curve).violations), None)
+    return judge.refuses_traffic(problem, curve)
 
 
 def _last_moving(driven: Curve, t_end: float, dt: float) -> float:

@@ -16,10 +16,41 @@ from repair.scene.traffic.rows import continued_from
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["extended", "traffic_until"]
+__all__ = ["LastSteps", "extended", "traffic_until"]
 
 
-def traffic_until(scene: Scene, n_steps: int) -> tuple[Obstacle, ...]:
+class LastSteps:
+    """The last steps that the file predicts, counted from the start; each obstacle is looked through once.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._found: dict[int, tuple[Any, int | None]] = {}  # by the id of what was looked through
+
+    def of(self, obstacle: Obstacle) -> int | None:
+        """That of an obstacle; None for what has no prediction."""
+        source = obstacle.source
+        return None if source is None else self._of(source, _only([source]))
+
+    @property
+    def of_all(self) -> int | None:
+        """That of the file; None where nothing moves."""
+        return self._of(self._scene.scenario, self._scene.scenario)
+
+    def _of(self, thing: Any, scenario: Any) -> int | None:
+        found = self._found.get(id(thing))
+        if found is None or found[0] is not thing:  # a copy of this may hold ids of other things
+            last = last_predicted_step(scenario)
+            found = thing, None if last is None else last - self._scene.initial_time_step
+            self._found[id(thing)] = found
+        return found[1]
+
+
+def traffic_until(scene: Scene, n_steps: int, ends: LastSteps | None = None) -> tuple[Obstacle, ...]:
     """The obstacles of a scene with ``n_steps + 1`` rows, at least as many as they have.
 
     What the file predicts beyond the scene's horizon is read from it, those included that come later; after
@@ -30,19 +61,23 @@ def traffic_until(scene: Scene, n_steps: int) -> tuple[Obstacle, ...]:
     scene : Scene
     n_steps : int
         Index of the last row.
+    ends : LastSteps, optional
+        Of this scene, where it is asked more than once.
     """
-    how = scene.settings.after_prediction
+    how, ends = scene.settings.after_prediction, ends or LastSteps(scene)
     found: list[Obstacle] = []
     for obstacle in scene.obstacles:
-        last = _last_step(obstacle, scene.initial_time_step)
+        last = ends.of(obstacle)
         if obstacle.source is not None and last is not None and last > scene.n_steps:
             found += _read([obstacle.source], scene, n_steps, how)
         else:
             found.append(_longer(obstacle, n_steps, how, scene.dt))
-    return (*found, *_later(scene, n_steps, how))
+    return (*found, *_later(scene, n_steps, how, ends))
 
 
-def extended(scene: Scene, known: Iterable[Obstacle], n_steps: int, how: str) -> tuple[Obstacle, ...]:
+def extended(
+    scene: Scene, known: Iterable[Obstacle], n_steps: int, how: str, ends: LastSteps | None = None
+) -> tuple[Obstacle, ...]:
     """Those of the obstacles whose prediction ends before ``n_steps``, as they go on after it.
 
     Parameters
@@ -53,25 +88,20 @@ def extended(scene: Scene, known: Iterable[Obstacle], n_steps: int, how: str) ->
     n_steps : int
     how : str
         ``hold`` or ``constant_velocity``.
+    ends : LastSteps, optional
+        Of this scene, where it is asked more than once.
     """
+    ends = ends or LastSteps(scene)
     loaded = scene.settings.after_prediction
     found: list[Obstacle] = []
     for obstacle in known:
-        last = _last_step(obstacle, scene.initial_time_step)
+        last = ends.of(obstacle)
         restarts = _unpredicted(obstacle) and how == "constant_velocity"
         if obstacle.source is not None and (restarts or (last is not None and loaded not in ("remove", how))):
             found += _read([obstacle.source], scene, n_steps, how)
         elif not np.isfinite(obstacle.states[n_steps, 0]):
             found.append(replace(_longer(obstacle, n_steps, how, scene.dt), late=0))
     return tuple(found)
-
-
-def _last_step(obstacle: Obstacle, first: int) -> int | None:
-    """The last step that the file predicts, counted from the start; None for what has no prediction."""
-    if obstacle.source is None:
-        return None
-    last = last_predicted_step(_only([obstacle.source]))
-    return None if last is None else last - first
 
 
 def _unpredicted(obstacle: Obstacle) -> bool:
@@ -91,10 +121,9 @@ def _read(sources: list[Any], scene: Scene, n_steps: int, how: str) -> tuple[Obs
     )[0]
 
 
-def _later(scene: Scene, n_steps: int, how: str) -> tuple[Obstacle, ...]:
+def _later(scene: Scene, n_steps: int, how: str, ends: LastSteps) -> tuple[Obstacle, ...]:
     """Obstacles that are there only after the scene's horizon."""
-    last = last_predicted_step(scene.scenario)
-    if last is None or last - scene.initial_time_step <= scene.n_steps or n_steps <= scene.n_steps:
+    if n_steps <= scene.n_steps or ends.of_all is None or ends.of_all <= scene.n_steps:
         return ()
     known = {id(obstacle.source) for obstacle in scene.obstacles}
     others = [o for o in scene.scenario.dynamic_obstacles if id(o) not in known]
