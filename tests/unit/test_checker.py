@@ -12,6 +12,7 @@ from repair.arrays import frozen
 from repair.check.checker import Checker
 from repair.check.limits import curve_excess, plane_excess
 from repair.check.settings import CheckerConfig, sampled
+from repair.check.verdict import Reason
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
@@ -86,6 +87,24 @@ def test_short_cuts_change_no_verdict(prepared, t_rep):
         seen.update(found or ("ok",))
     assert {"limits", "off_road"} <= seen
     assert ("ok" in seen) == (t_rep < 1.0)  # later it is too late
+
+
+@pytest.mark.parametrize("t_rep", [0.0, 0.25, 1.6])
+def test_asked_for_the_traffic_alone_it_says_the_same_of_it(prepared, t_rep):
+    problem, seen = replace(prepared.source.at(0.0)[0], t_rep=t_rep), set()
+    checker = Checker(
+        prepared.scene, prepared.checker.limits, replace(prepared.checker.config, margin=False),
+        prepared.checker.reference_limits,
+    )  # fmt: skip
+    for curve in curves(prepared, problem, 40, 5):
+        of_traffic = [
+            found
+            for found in checker.check(problem, curve).violations
+            if found.reason in (Reason.COLLISION, Reason.MARGIN)
+        ]
+        assert next(iter(of_traffic), None) == checker.refuses_traffic(problem, curve)
+        seen.add(bool(of_traffic))
+    assert True in seen
 
 
 def test_what_is_kept_of_one_reference_is_not_used_for_another(prepared):
