@@ -13,7 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.followed import Followed, is_finite, motion_of
+from repair.check.followed import Followed, is_finite, motion_of, slip_at_start
 from repair.check.limits import (
     as_violation,
     curve_excess,
@@ -27,7 +27,6 @@ from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
 from repair.check.verdict import Reason, Verdict, Violation, met
 from repair.curves.base import Curve, FrenetTrajectory
-from repair.curves.plane import STANDSTILL
 from repair.deadline import in_time
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
@@ -43,9 +42,6 @@ if TYPE_CHECKING:
 __all__ = ["Checker"]
 
 _TURNED = 0.01  # a repair may begin turned off the reference by this [rad]
-# The body begins as the planning problem has it where that of steady driving is off by more than the one and
-# less than the other [rad]; beyond, the path says something else about the start than the problem.
-_UNSTEADY, _STATED = 0.003, 0.03
 
 
 class Checker:
@@ -97,7 +93,7 @@ class Checker:
     def drive(self, curve: Curve, t_end: float) -> DrivenStates:
         """Consistent vehicle states along the curve, densely sampled."""
         path = self.path(curve, t_end)
-        return self.scene.model.drive(path, self._standing(path))
+        return self.scene.model.drive(path, slip_at_start(self.scene, path))
 
     def peaks(self, curve: Curve, t_end: float, t_from: float = 0.0) -> Peaks:
         """Extremes over [t_from, t_end]."""
@@ -219,7 +215,7 @@ class Checker:
         times = self.times(t_end)
         motion = motion_of(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
-        slip, orientation = self.scene.model.angles(path, self._standing(path))
+        slip, orientation = self.scene.model.angles(path, slip_at_start(self.scene, path))
         self._followed = Followed(reference, t_end, motion, slip, float(path.heading[0]))
         return path, motion[0], slip, orientation
 
@@ -250,25 +246,7 @@ class Checker:
             motion[:, : late - first] = kept.motion[:, first:late]
             slip0 = None if first == 0 else float(kept.slip[first])
         path = self.scene.frame.carry(times[first:], motion)
-        return first, after, path, motion[0], self._standing(path) if first == 0 else slip0
-
-    def _standing(self, path: CartesianPath) -> float | None:
-        """Slip angle at t = 0 where the body's orientation is known; None for that of steady driving.
-
-        It is where a reference states it, and where the vehicle stands: of a path that stands the direction
-        is held, so that it says nothing about the body's.
-        """
-        known = self.scene.first_heading
-        if known is not None and len(path.speed):
-            return float(wrap(path.heading[0] - known))
-        if len(path.speed) and abs(float(path.speed[0])) < STANDSTILL:
-            return float(wrap(path.heading[0] - self.scene.initial_state.orientation))
-        if len(path.speed) > 1:  # where a path begins in a bend that changes, no steady driving fits it
-            _, orientation = self.scene.model.angles(path, None)
-            turned = float(wrap(orientation[0] - self.scene.initial_state.orientation))
-            if _UNSTEADY < abs(turned) < _STATED:
-                return float(wrap(path.heading[0] - self.scene.initial_state.orientation))
-        return None
+        return first, after, path, motion[0], slip_at_start(self.scene, path) if first == 0 else slip0
 
     def _clear(
         self, path: CartesianPath, s: Array, orientation: Array, first_sample: int, t_from: float
