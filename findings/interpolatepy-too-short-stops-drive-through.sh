@@ -6,7 +6,7 @@
 # What happens: none is refused. With limits of 4 m/s² and 10 m/s³ a stop from 20 m/s takes 54 m. By DoubleSTrajectory it
 # comes out in 45 m with 5 m/s², in 30 m with 10 m/s². Below that its phases vanish: a stop within 20 m is a ride at
 # 20 m/s that ends, at 20 m/s, 20 m behind the place of the stop, in a time that looks like that of a stop. With
-# a jerk limit of 2 m/s³ it is so for 60 m. TrapezoidalTrajectory lets the speed fall to 15.5 m/s at once.
+# a jerk limit of 2 m/s³ it is so for 60 m. TrapezoidalTrajectory lets the speed fall to 15.8 m/s at once.
 # Why it matters: emergency stops and short gaps are when the limits are reached; the profile is used as one that keeps
 # them and its end.
 #
