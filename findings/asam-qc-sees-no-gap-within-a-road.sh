@@ -8,8 +8,8 @@
 # not seen; since both lines have the same heading there is a warning that the second is redundant, as if one line had
 # been written as two. A kink of 90 degrees and a length of 150 m for 100 m of line are no issues at all.
 # In files of OpenDRIVE 1.6 and before the gap between roads is no issue either: the rule is skipped for them.
-# Why it matters: "0 issues" by the standard's own checker is what maps are accepted by; the files of CARLA, RoadRunner and
-# most suppliers are of 1.4 to 1.6, and a lane with a hole is one for which every reader has an answer of its own.
+# Why it matters: "0 issues" by the standard's own checker is what maps are accepted by (those of CARLA, for one, are of
+# version 1.4), and a lane with a hole is one for which every reader has an answer of its own.
 #
 # Output seen:
 #   asam-qc-opendrive 1.0.0
