@@ -26,7 +26,10 @@ BACKENDS = {
     "qptr": ("qptr", ()),
     "casadi ipopt": ("casadi", ("casadi.solver=ipopt",)),
     "casadi sqpmethod": ("casadi", ("casadi.solver=sqpmethod",)),
+    "shooting": ("shooting", ()),
+    "portfolio": ("portfolio", ()),
 }
+DEFAULT = ["ego", "qptr", "casadi ipopt", "casadi sqpmethod"]  # what early versions have as well
 REFERENCES = ("constant", "accelerate")
 
 
@@ -90,7 +93,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.before", description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--before", required=True, metavar="COMMIT")
-    parser.add_argument("--backend", nargs="+", default=list(BACKENDS), choices=list(BACKENDS))
+    parser.add_argument("--backend", nargs="+", default=DEFAULT, choices=list(BACKENDS))
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE")
     parser.add_argument("--out", type=Path, metavar="FILE")
     arguments = parser.parse_args()

@@ -19,7 +19,8 @@ from repair.mitigation.settings import MitigationConfig
 from repair.solvers.shooting.impact import Impacts
 from repair.solvers.shooting.plans import ALONG, FREE
 from repair.solvers.shooting.settings import ShootingConfig
-from repair.solvers.shooting.task import Shot, Task
+from repair.solvers.shooting.shots import Shot
+from repair.solvers.shooting.task import Task
 from repair.terminal.family import stops_from
 from repair.timegrid import intervals, on_grid
 from repair.vehicle.states import DrivenStates

@@ -153,7 +153,9 @@ class FrenetFrame:
 
     def curvature(self, s: npt.ArrayLike) -> Array:
         """Curvature [1/m] at ``s``, left positive."""
-        _, (x1, y1), (x2, y2) = self._derivatives(s, 2)
+        _, u, (c3, c2, c1, _) = self.pieces_at(s)
+        bend = c3 * u
+        (x2, y2), (x1, y1) = 6.0 * bend + 2.0 * c2, (3.0 * bend + 2.0 * c2) * u + c1
         square = x1 * x1 + y1 * y1
         return np.asarray((x1 * y2 - y1 * x2) / (square * np.sqrt(square)))
 
@@ -174,6 +176,11 @@ class FrenetFrame:
         (x, y), (x1, y1) = self._derivatives(s, 1)
         offset = np.asarray(l, dtype=np.float64) / np.sqrt(x1 * x1 + y1 * y1)
         return _pairs(x - offset * y1, y + offset * x1)
+
+    def axis(self, s: npt.ArrayLike) -> tuple[Array, Array]:
+        """Points of the path and its unit tangents at ``s`` (...), both (2, ...)."""
+        points, (x1, y1) = self._derivatives(s, 1)
+        return points, np.array((x1, y1)) / np.sqrt(x1 * x1 + y1 * y1)
 
     # ------------------------------------------------------------------ projection
 

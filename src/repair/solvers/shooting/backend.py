@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import time
 
-from repair.backend.base import Capabilities, Closest, Configuration, SolveResult, SolveStatus
+from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
-from repair.solvers.shooting.plans import ALONG, FREE
+from repair.solvers.shooting.plans import ALONG, FREE, Plan
 from repair.solvers.shooting.settings import ShootingConfig
+from repair.solvers.shooting.shots import Shot
 from repair.solvers.shooting.task import Task
 
 __all__ = ["ShootingBackend", "make"]
@@ -56,7 +57,7 @@ class ShootingBackend:
         begin = time.perf_counter()
         task = Task(problem, self.config)
         built = time.perf_counter()
-        closest: Closest | None = None
+        best: tuple[Plan, Shot] | None = None
         try:
             with until(None if time_limit is None else begin + time_limit):
                 plans = (ALONG, FREE) if problem.lateral else (ALONG,)
@@ -66,14 +67,15 @@ class ShootingBackend:
                             SolveStatus.SOLVED, task.curve(plan, shot), shot.cost, task.iterations,
                             built - begin, time.perf_counter() - built, residuals={"excess": shot.miss},
                         )  # fmt: skip
-                    if closest is None or shot.miss < closest.miss:
-                        closest = Closest(task.curve(plan, shot), shot.miss)
+                    if best is None or (-shot.reached, shot.miss) < (-best[1].reached, best[1].miss):
+                        best = plan, shot
+                assert best is not None
+                closest = task.closest(*best)
         except OutOfTime:
             return SolveResult(
                 SolveStatus.TIME_LIMIT, iterations=task.iterations, build_time=built - begin,
                 solve_time=time.perf_counter() - built, detail="the time limit was reached",
             )  # fmt: skip
-        assert closest is not None
         return SolveResult(
             SolveStatus.INFEASIBLE, iterations=task.iterations, build_time=built - begin,
             solve_time=time.perf_counter() - built,

@@ -22,12 +22,11 @@ def curve_of(problem: RepairProblem, driven: Driven, car: Car) -> BernsteinCurve
     car : Car
         That drove them, in two parts to a step.
     """
-    s, l, v, chi, beta, a, rate = (column[0] for column in halved(car, driven))  # noqa: E741
+    s, l, v, chi, beta, a, rate, along, aside = (column[0] for column in halved(car, driven))  # noqa: E741
     frame = problem.shapes.frame if problem.shapes is not None else None
     kappa = frame.curvature(s) if frame is not None else problem.curvature_at(s)
     change = frame.curvature_rate(s) if frame is not None else np.zeros_like(s)
     scale = 1.0 - kappa * l
-    along, aside = v * np.cos(chi) / scale, v * np.sin(chi)
     turn = v * np.sin(beta) / car.vehicle.rear - kappa * along
 
     def bends(k: slice) -> Array:
@@ -44,7 +43,7 @@ def curve_of(problem: RepairProblem, driven: Driven, car: Car) -> BernsteinCurve
 
 def curve_along(problem: RepairProblem, driven: Driven, car: Car) -> BernsteinCurve:
     """The first of the trajectories, which keep to the path of the reference, at its offset then."""
-    s, _, v, _, _, a, _ = (column[0] for column in driven)
+    s, v, a = driven.s[0], driven.v[0], driven.a[0]
     times = problem.t_rep + car.dt * np.arange(len(s))
     path = problem.reference.sample(times)
     l, rate, bend = path.position[:, 1], path.velocity[:, 1], path.acceleration[:, 1]  # noqa: E741

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from repair.arrays import Array, Points
 from repair.problem.shapes import Shapes
-from repair.solvers.shooting.motion import Driven
+from repair.solvers.shooting.motion import Driven, direction
 from repair.solvers.shooting.space import Space, depths, looks
 from repair.world.tracks import Index, as_complex
 
@@ -110,10 +110,12 @@ class Impacts(Space):
     leaves: bool = False
     most: float = math.inf
 
-    def excess(self, driven: Driven) -> tuple[Array, Array]:
+    adds_up: ClassVar[bool] = False
+
+    def excess(self, driven: Driven, begun: int = 0) -> tuple[Array, Array]:
         """The speed of the first impact [m/s], twice (N,); 0 for who meets nothing and keeps to the road."""
         problem, shapes, shown = self.problem, self.problem.shapes, len(self._times)
-        s, l, chi, beta = (x[:, :shown] for x in looks(problem, driven, self.steps.dt, self.fine))  # noqa: E741
+        s, l, chi, beta = looks(driven, self.steps.dt, self.fine, shown)  # noqa: E741
         share = np.arange(1, self.fine + 1) / self.fine
         v = driven.v[:, :-1, None] + share * (driven.v[:, 1:, None] - driven.v[:, :-1, None])
         v = v.reshape(len(s), -1)[:, :shown]
@@ -127,7 +129,7 @@ class Impacts(Space):
             met = struck(shapes, self._rectangles, self._moving, centre, axis + chi - beta, velocity)
             speed, worst, first = met.speed + _DEEP * met.deepest, met.worst, met.first
         if problem.lateral:
-            beyond = self._off_road(s, l, chi - beta) > 0.0
+            beyond = self._off_road(s, l, *direction(chi - beta)) > 0.0
             left = np.where(beyond.any(axis=1), beyond.argmax(axis=1), shown)
             own = np.where(left < shown, v[np.arange(len(s)), np.minimum(left, shown - 1)], 0.0)
             worst = np.maximum(worst, own)

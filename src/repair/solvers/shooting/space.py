@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from repair.arrays import Array, Points
 from repair.problem.problem import RepairProblem
 from repair.problem.shapes import Shapes
-from repair.solvers.shooting.motion import Driven
+from repair.solvers.shooting.motion import Driven, direction
 from repair.solvers.shooting.plans import Steps
-from repair.world.tracks import as_complex
 
 __all__ = ["Space", "depths", "looks"]
 
 _ABEAM = 1.3  # [rad]
 _INCH = 1e-3  # a margin that is kept to this is kept [m]
-_MOST = 100_000  # places of bodies and obstacles that are compared at once: 1.6 MB for each step of it
+_MOST = 30_000  # places of bodies and obstacles that are compared at once: what is made on the way stays near
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,18 @@ class Space:
         Of a trajectory.
     fine : int
         Looks at each step.
-    edge : float
-        Distance to keep from the end of the lateral room [m].
+    edge, spare : float
+        Distance to keep from the end of the lateral room, and more of it from obstacles [m].
     """
 
     problem: RepairProblem
     steps: Steps
     fine: int
     edge: float = 0.0
+    spare: float = 0.0
+
+    #: Whether the excess over one time is part of that over a longer one.
+    adds_up: ClassVar[bool] = True
 
     @cached_property
     def _times(self) -> Array:
@@ -64,7 +68,7 @@ class Space:
         assert shapes is not None
         now = shapes.at(np.array([problem.t_rep]))
         rows, columns = np.isfinite(now[..., 0]).nonzero()
-        room = np.full(len(now), shapes.room + _INCH)
+        room = np.full(len(now), shapes.room + _INCH + self.spare)
         if len(rows):
             s, l = problem.start[0]  # noqa: E741
             centre = shapes.frame.to_cartesian(s, l).view(np.complex128)
@@ -73,23 +77,34 @@ class Space:
                 np.broadcast_to(centre, (1, len(rows))), np.broadcast_to(heading, (1, len(rows))),
                 now[rows, columns], shapes, room[rows],
             )[0]  # fmt: skip
-            room[rows[depth > 0.0]] = 0.0
+            room[rows[depth > 0.0]] = self.spare
         return room
 
-    def excess(self, driven: Driven) -> tuple[Array, Array]:
-        """How far into obstacles and beyond the road, in metres times looks, and at most in metres (N,)."""
-        s, l, chi, beta = looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
-        shown = len(self._times)
-        s, l, chi, beta = s[:, :shown], l[:, :shown], chi[:, :shown], beta[:, :shown]  # noqa: E741
+    def excess(self, driven: Driven, begun: int = 0) -> tuple[Array, Array]:
+        """How far into obstacles and beyond the road, in metres times looks, and at most in metres (N,).
+
+        Parameters
+        ----------
+        driven : Driven
+        begun : int
+            Steps that were driven before it.
+        """
+        # (P, N): what is compared with an obstacle at a look lies together.
+        first = begun * self.fine
+        shown = len(self._times) - first
+        s, l, chi, beta = (x.T for x in looks(driven, self.steps.dt, self.fine, shown))  # noqa: E741
+        now = slice(first, first + len(s))
+        turned = chi - beta
+        cos, sin = direction(turned)
         if self.problem.shapes is None:
-            total, most = self._in_boxes(s, l)
+            total, most = self._in_boxes(s.T, l.T, now)
         else:
-            total, most = self._in_shapes(s, l, chi - beta, self.problem.shapes)
+            total, most = self._in_shapes(s, l, cos, sin, self.problem.shapes, now)
         total, most = total + _lost(driven), most + _lost(driven)
         if self.problem.lateral:
-            beyond = self._off_road(s, l, chi - beta)
-            total = total + beyond.sum(axis=1) / self.fine
-            most = np.maximum(most, beyond.max(axis=1, initial=0.0))
+            beyond = self._off_road(s, l, cos, sin)
+            total = total + beyond.sum(axis=0) / self.fine
+            most = np.maximum(most, beyond.max(axis=0, initial=0.0))
         return total, most
 
     def overload(self, driven: Driven) -> Array:
@@ -106,62 +121,84 @@ class Space:
     def off_the_map(self, driven: Driven) -> Array:
         """At how many looks the ego leaves the road itself (N,), of which the lateral room is a table."""
         shapes = self.problem.shapes
-        if shapes is None or shapes.road is None:
+        if shapes is None or shapes.road is None or not len(driven.s):
             return np.zeros(len(driven.s))
-        s, l, chi, beta = looks(self.problem, driven, self.steps.dt, self.fine)  # noqa: E741
-        x, y = shapes.frame.to_cartesian(s, l).reshape(-1, 2).T
-        inside = shapes.road.inside(shapes.road.outline(x, y, (shapes.frame.heading(s) + chi - beta).ravel()))
-        off: Array = np.count_nonzero(~inside.reshape(s.shape), axis=1).astype(np.float64)
-        return off
+        s, l, chi, beta = looks(driven, self.steps.dt, self.fine)  # noqa: E741
+        x, y = np.moveaxis(shapes.frame.to_cartesian(s, l), -1, 0)
+        heading, road = shapes.frame.heading(s) + chi - beta, shapes.road
+        known = np.array([road.surely_inside(*pose) for pose in zip(x, y, heading, strict=True)])
+        row, look = (~known).nonzero()
+        inside = road.inside(road.outline(x[row, look], y[row, look], heading[row, look]))
+        return np.bincount(row[~inside], minlength=len(s)).astype(np.float64)
 
-    def _in_shapes(self, s: Array, l: Array, turned: Array, shapes: Shapes) -> tuple[Array, Array]:  # noqa: E741
-        plane = shapes.frame.to_cartesian(s, l)
-        centre = as_complex(plane[..., 0], plane[..., 1])
-        heading = shapes.frame.heading(s) + turned
-        boxes = self._rectangles
-        # Only who may be met by some trajectory at that time is looked at.
-        reach = shapes.vehicle.radius + shapes.room + np.hypot(boxes[..., 3], boxes[..., 4])
+    def _in_shapes(
+        self, s: Array, l: Array, cos: Array, sin: Array, shapes: Shapes, now: slice  # noqa: E741
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Of bodies (P, N), turned out of the axis."""
+        (x, y), (tx, ty) = shapes.frame.axis(s)
+        x, y = x - l * ty, y + l * tx
+        boxes, count = self._rectangles[:, now], s.shape[1]
+        # Only who may be met by some trajectory at that time is looked at, and then by whom.
+        reach = self._reach[:, now]
         away = [
-            np.maximum(low.min(axis=0) - at, at - low.max(axis=0))
-            for low, at in ((centre.real, boxes[..., 0]), (centre.imag, boxes[..., 1]))
+            np.maximum(low.min(axis=1) - at, at - low.max(axis=1))
+            for low, at in ((x, boxes[..., 0]), (y, boxes[..., 1]))
         ]
         track, look = ((away[0] < reach) & (away[1] < reach)).nonzero()
-        if not len(track):
-            none = np.zeros(len(s))
-            return none, none
-        depth = np.empty((len(s), len(look)))
-        for part in _parts(len(look), _MOST // len(s)):  # what is made on the way is several times as large
+        total, most = np.zeros(count), np.zeros(count)
+        for part in _parts(len(look), _MOST // count):
             who, when = track[part], look[part]
-            depth[:, part] = depths(
-                centre[:, when], heading[:, when], boxes[who, when], shapes, self._room[who]
-            )
-        return depth.sum(axis=1) / self.fine, depth.max(axis=1)
+            box = boxes[who, when]
+            dx, dy = box[:, :1] - x[when], box[:, 1:2] - y[when]
+            pair, row = (dx * dx + dy * dy < reach[who, when, None] ** 2).nonzero()
+            if not len(pair):
+                continue
+            k = when[pair]
+            mine = cos[k, row], sin[k, row], tx[k, row], ty[k, row]
+            heading = mine[2] * mine[0] - mine[3] * mine[1], mine[3] * mine[0] + mine[2] * mine[1]
+            turn, halves = box[:, 2], box[:, 3:].T
+            depth = _overlap(
+                dx[pair, row], dy[pair, row], heading, (np.cos(turn)[pair], np.sin(turn)[pair]),
+                halves.take(pair, axis=1), shapes, self._room[who][pair],
+            )  # fmt: skip
+            total += np.bincount(row, depth, count)
+            np.maximum.at(most, row, depth)
+        return total / self.fine, most
 
-    def _in_boxes(self, s: Array, l: Array) -> tuple[Array, Array]:  # noqa: E741
+    @cached_property
+    def _reach(self) -> Array:
+        """How far from the ego's centre those of the rectangles (M, P) are that it may meet [m]."""
+        shapes, sides = self.problem.shapes, self._rectangles[..., 3:]
+        assert shapes is not None
+        car, room = shapes.vehicle, shapes.room + _INCH + self.spare
+        own = np.hypot(car.half_length + room, car.half_width + room)
+        return np.asarray(own + np.hypot(sides[..., 0], sides[..., 1]))
+
+    def _in_boxes(self, s: Array, l: Array, now: slice) -> tuple[Array, Array]:  # noqa: E741
         occupancy, margin = self.problem.occupancy, self.problem.margin
         if not len(occupancy):
             none = np.zeros(len(s))
             return none, none
-        lower, upper = occupancy.at(self._times)
+        lower, upper = occupancy.at(self._times[now])
         place = np.stack((s, l), axis=-1)[:, None]
         depth = np.minimum(place - lower + margin, upper + margin - place).min(axis=-1)
         depth = np.maximum(np.nan_to_num(depth), 0.0)
         return depth.sum(axis=(1, 2)) / self.fine, depth.max(axis=(1, 2))
 
-    def _off_road(self, s: Array, l: Array, turned: Array) -> Array:  # noqa: E741
-        """How far the ego's corner that is farthest out is beyond the lateral room."""
+    def _off_road(self, s: Array, l: Array, cos: Array, sin: Array) -> Array:  # noqa: E741
+        """How far the ego's corners are beyond the lateral room, each on its own side."""
         problem, shapes = self.problem, self.problem.shapes
         length, width = (shapes.vehicle.half_length, shapes.vehicle.half_width) if shapes else (0.0, 0.0)
+        beyond, bounds = np.zeros(s.shape), problem.bounds
+        spare, flank = width - self.edge, width * cos
         kappa = problem.curvature_at(s)
-        cos, sin = np.cos(turned), np.sin(turned)
-        beyond = np.zeros_like(s)
-        for ahead, aside in ((1, 1), (1, -1), (-1, 1), (-1, -1)) if shapes else ((0, 0),):
-            along = ahead * length * cos - aside * width * sin
-            across = l + ahead * length * sin + aside * width * cos - 0.5 * kappa * along * along
-            right, left = problem.bounds.at(s + along / (1.0 - kappa * l))
-            spare = width - self.edge
-            np.maximum(beyond, right - spare - across, out=beyond)
-            np.maximum(beyond, across - left - spare, out=beyond)
+        scale = 1.0 - kappa * l
+        for ahead in (1, -1) if shapes else (0,):
+            for side, table in ((1.0, bounds.left), (-1.0, bounds.right)):
+                along = ahead * length * cos - side * width * sin
+                across = l + ahead * length * sin + side * flank - 0.5 * kappa * along * along
+                room = np.interp(s + along / scale, bounds.s, table)
+                np.maximum(beyond, side * (across - room) - spare, out=beyond)
         return beyond
 
 
@@ -176,24 +213,25 @@ def _lost(driven: Driven) -> Array:
     return np.asarray(np.maximum(np.abs(driven.chi) - _ABEAM, 0.0).max(axis=1))
 
 
-def looks(problem: RepairProblem, driven: Driven, dt: float, fine: int) -> tuple[Array, Array, Array, Array]:
-    """s, l, chi and beta (N, T fine) within and at the end of the steps: cubics and lines."""
-    s, l, v, chi, beta = driven[:5]  # noqa: E741
-    along = v * np.cos(chi) / (1.0 - problem.curvature_at(s) * l)
-    found = np.empty((4, len(s), s.shape[1] - 1, fine))
-    shares = [(k + 1) / fine for k in range(fine)]
-    for out, value, slope in ((found[0], s, along), (found[1], l, v * np.sin(chi))):
-        begin, change = value[:, :-1], np.diff(value)
-        first, last = dt * slope[:, :-1], dt * slope[:, 1:]
+def looks(driven: Driven, dt: float, fine: int, shown: int | None = None) -> tuple[Array, ...]:
+    """s, l, chi and beta (N, P) at the first looks within and at the end of steps: cubics and lines."""
+    count, steps = driven.a.shape
+    found = np.empty((4, steps, fine, count))
+    shares = [(k + 1) / fine for k in range(fine - 1)]
+    for out, column, rate in ((found[0], driven.s, driven.along), (found[1], driven.l, driven.aside)):
+        value, slope = column.T, dt * rate.T
+        begin, change = value[:-1], np.diff(value, axis=0)
+        first, last = slope[:-1], slope[1:]
         bend, rest = 3.0 * change - 2.0 * first - last, first + last - 2.0 * change
         for k, x in enumerate(shares):
-            out[..., k] = begin + x * (first + x * (bend + x * rest))
-    for out, value in ((found[2], chi), (found[3], beta)):
-        change = np.diff(value)
+            out[:, k] = begin + x * (first + x * (bend + x * rest))
+        out[:, -1] = value[1:]
+    for out, value in ((found[2], driven.chi.T), (found[3], driven.beta.T)):
+        change = np.diff(value, axis=0)
         for k, x in enumerate(shares):
-            out[..., k] = value[:, :-1] + x * change
-    s, l, chi, beta = found.reshape(4, len(s), -1)  # noqa: E741
-    return s, l, chi, beta
+            out[:, k] = value[:-1] + x * change
+        out[:, -1] = value[1:]
+    return tuple(found.reshape(4, steps * fine, count)[:, :shown].transpose(0, 2, 1))
 
 
 def depths(centre: Points, heading: Array, boxes: Array, shapes: Shapes, room: Array) -> Array:
@@ -201,16 +239,21 @@ def depths(centre: Points, heading: Array, boxes: Array, shapes: Shapes, room: A
 
     Along the axis that leaves most (separating axes).
     """
+    x, y, turn, half_length, half_width = boxes.T
+    body, other = (np.cos(heading), np.sin(heading)), (np.cos(turn), np.sin(turn))
+    return _overlap(x - centre.real, y - centre.imag, body, other, (half_length, half_width), shapes, room)
+
+
+def _overlap(
+    dx: Array, dy: Array, body: Sequence[Array], other: Sequence[Array], halves: Sequence[Array] | Array,
+    shapes: Shapes, room: Array,
+) -> Array:  # fmt: skip
+    """As :func:`depths`: of rectangles that are (dx, dy) away, by the directions of both."""
     length, width = shapes.vehicle.half_length + room, shapes.vehicle.half_width + room
-    x, y, direction, half_length, half_width = boxes.T
-    away = as_complex(x, y) - centre
-    turn = np.exp(1j * (direction - heading))
-    axis = np.exp(-1j * direction)
-    theirs = away * axis
-    mine = theirs * turn
-    cos, sin = np.abs(turn.real), np.abs(turn.imag)
-    gap = np.abs(mine.real) - (length + half_length * cos + half_width * sin)
-    np.maximum(gap, np.abs(mine.imag) - (width + half_length * sin + half_width * cos), out=gap)
-    np.maximum(gap, np.abs(theirs.real) - (half_length + length * cos + width * sin), out=gap)
-    np.maximum(gap, np.abs(theirs.imag) - (half_width + length * sin + width * cos), out=gap)
+    (hx, hy), (ox, oy), (half_length, half_width) = body, other, halves
+    cos, sin = np.abs(hx * ox + hy * oy), np.abs(hx * oy - hy * ox)
+    gap = np.abs(dx * hx + dy * hy) - (length + half_length * cos + half_width * sin)
+    np.maximum(gap, np.abs(dy * hx - dx * hy) - (width + half_length * sin + half_width * cos), out=gap)
+    np.maximum(gap, np.abs(dx * ox + dy * oy) - (half_length + length * cos + width * sin), out=gap)
+    np.maximum(gap, np.abs(dy * ox - dx * oy) - (half_width + length * sin + width * cos), out=gap)
     return np.asarray(np.maximum(-gap, 0.0))

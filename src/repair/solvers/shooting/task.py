@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from enum import Enum
+from functools import reduce
 
 import numpy as np
 
 from repair.arrays import Array
+from repair.backend.base import Closest
 from repair.check.limits import plane_excess
 from repair.curves.base import Curve
 from repair.deadline import in_time
 from repair.problem.problem import RepairProblem
 from repair.solvers.shooting.curve import curve_along, curve_of
-from repair.solvers.shooting.motion import Car, Driven, drive_along, drive_freely
+from repair.solvers.shooting.motion import Car, Driven, Tail, drive_along, drive_freely
 from repair.solvers.shooting.plans import Plan, Steps, first_along, first_freely
 from repair.solvers.shooting.settings import ShootingConfig
+from repair.solvers.shooting.shots import First, Looked, Shot, apart, effort_of, far
 from repair.solvers.shooting.space import Space
-from repair.timegrid import SHORT
+from repair.timegrid import SHORT, steps_until
 from repair.vehicle.parameters import Vehicle, load_vehicle
 from repair.vehicle.single_track import body_angles
 
-__all__ = ["First", "Shot", "Task"]
+__all__ = ["Task"]
 
 _COARSE, _FINE = 2, 8  # looks at a step: while searching, and before a trajectory counts as found
 _ON_MAP = 4  # looks at a step at the road itself
@@ -33,31 +36,15 @@ _HISTORY = 120  # samples of the reference before t_rep, after which the body's 
 _MORE = 0.01  # and more of it, where that is too little
 _LITTLE = 0.01  # what counts as a miss and is none of a distance [m]
 _PROGRESS = 0.02  # share of what is left by which an iteration has to be better than those before it
+_STAGES = (0.4, 0.8, 1.6)  # [s] since t_rep: where all have met something by one, they drive to the next
+_INCH = 1e-3  # by which more is kept from obstacles where what is driven exactly meets one [m]
 _EDGE = 0.05  # by which the lateral room is narrowed where a trajectory in it leaves the road [m]
 
 
-@dataclass(frozen=True)
-class Shot:
-    """The best trajectory so far.
+class _Why(Enum):
+    """What the closer look found that the first one had not seen."""
 
-    Attributes
-    ----------
-    row : (1, D) array
-    cost, miss : float
-        What was minimised, and by how much an obstacle or the road's edge is missed at most [m].
-    """
-
-    row: Array
-    cost: float
-    miss: float
-
-
-class First(NamedTuple):
-    """The manoeuvres that a search begins with: rows (N, D), their costs (N,), and the best of them."""
-
-    rows: Array
-    cost: Array
-    best: Shot
+    ROAD, PLACE, STRAIN = range(3)
 
 
 class Task:
@@ -81,6 +68,7 @@ class Task:
     ) -> None:
         self.problem, self.config = problem, config
         self.iterations = 0
+        self._last: tuple[Plan, Array, Driven] | None = None
         self.steps = Steps.between(problem.t_rep, problem.t_end, problem.dt)
         shapes = problem.shapes
         vehicle = shapes.vehicle if shapes is not None else load_vehicle()
@@ -103,19 +91,47 @@ class Task:
 
     def drive(self, plan: Plan, rows: Array, car: Car) -> Driven:
         """The trajectories (N,) of controls (N, D)."""
+        (driven,) = self._driven(plan, rows, car, [self.steps.count])
+        return driven
+
+    def _driven(self, plan: Plan, rows: Array, car: Car, ends: Sequence[int]) -> Iterator[Driven]:
+        """The same, in parts that end at steps."""
         limits, begun = self.problem.limits, float(self.problem.start[2, 0])
         wanted = plan.accelerations(rows, self.steps, begun, limits.a_min, limits.a_max)
-        if not plan.steers:
-            return drive_along(car, self.start, wanted)
-        turning = plan.steering(rows, self.steps)
-        return drive_freely(car, self.start, wanted, turning, plan.tail(rows, self.steps))
+        if plan.steers:
+            turning, tail = plan.steering(rows, self.steps), plan.tail(rows, self.steps)
+        begin, start = 0, self.start
+        for end in ends:
+            if plan.steers:
+                rest = Tail(tail.step - begin, tail.offset)
+                driven = drive_freely(car, start, wanted[:, begin:end], turning[:, begin:end], rest)
+            else:
+                driven = drive_along(car, start, wanted[:, begin:end])
+            yield driven
+            begin, start = end, driven.last
 
     def curve(self, plan: Plan, shot: Shot) -> Curve:
         """The curve of the best trajectory."""
-        driven = self.drive(plan, shot.row, self.exact)
+        driven = self._exactly(plan, shot.row)
         if not plan.steers:
             return curve_along(self.problem, driven, self.exact)
         return curve_of(self.problem, driven, self.exact)
+
+    def closest(self, plan: Plan, shot: Shot) -> Closest:
+        """The curve of the best trajectory where it misses something, and by how much until its end."""
+        driven = self._exactly(plan, shot.row)
+        miss = max(shot.miss, float(self.fine.excess(driven)[1][0]))
+        return Closest(self.curve(plan, shot), miss)
+
+    def _exactly(self, plan: Plan, rows: Array) -> Driven:
+        """The trajectories (N,) on the axis itself; those of the last time are remembered."""
+        if self._last is not None and plan is self._last[0] and len(rows) == 1:
+            same = np.flatnonzero((self._last[1] == rows).all(axis=1))
+            if len(same):
+                return self._last[2].take(same[:1])
+        driven = self.drive(plan, rows, self.exact)
+        self._last = plan, rows, driven
+        return driven
 
     def shots(self, plans: Iterable[Plan]) -> Iterator[tuple[Plan, Shot]]:
         """The best of what each plan begins with, and then of what is drawn around that."""
@@ -130,8 +146,8 @@ class Task:
 
     def _first(self, plan: Plan) -> First:
         rows = first_freely() if plan.steers else first_along()
-        cost, deep, driven = self._cost(plan, rows)
-        return First(rows, cost, self._best(plan, rows, cost, deep, driven))
+        looked = self._look(plan, rows)
+        return First(rows, looked.cost, self._best(plan, rows, looked))
 
     def search(self, plan: Plan, first: First | None = None) -> Shot:
         """The best that is found.
@@ -149,26 +165,34 @@ class Task:
         if best.miss <= 0.0 or not self.config.iterations:
             return best
         random = np.random.default_rng(self.config.seed)
-        means = _apart(rows, cost, self.config.means)
+        means = apart(rows, cost, self.config.means)
         spreads = np.repeat(plan.spread[None], len(means), axis=0)
-        least, idle = np.array((best.miss, cost.min())), 0
-        for _ in range(self.config.iterations):
+        # By place alone: what makes an impact least is no matter of all or nothing.
+        avoids = self.coarse.adds_up
+        patience = self.config.patience if plan.steers or not avoids else 1
+        least, idle = [np.array((best.miss, cost.min()))], 0
+        for left in reversed(range(self.config.iterations)):
             in_time()
             noise = random.standard_normal((len(means), self.config.population, plan.size))
             draws = plan.kept((means[:, None] + spreads[:, None] * noise).reshape(-1, plan.size))
             draws[:: self.config.population] = means
-            cost, deep, driven = self._cost(plan, draws)
-            found = self._best(plan, draws, cost, deep, driven)
+            looked = self._look(plan, draws)
+            found = self._best(plan, draws, looked)
             if found.miss <= 0.0:
                 return found
-            if found.miss < best.miss:
-                best = found
-            now = np.array((found.miss, cost.min()))
-            idle = 0 if (now < (1.0 - _PROGRESS) * least).any() else idle + 1
-            if idle == self.config.patience:
-                break
-            least = np.minimum(least, now)
-            means, spreads = self._next(means, spreads, draws, cost)
+            now = np.array((found.miss, looked.cost.min()))
+            if found.reached > best.reached:
+                best, least, idle = found, [now], 0
+            else:
+                if found.reached < best.reached:
+                    now[:] = np.inf
+                elif found.miss < best.miss:
+                    best = found
+                idle = 0 if (now < (1.0 - _PROGRESS) * least[-1]).any() else idle + 1
+                least.append(np.minimum(least[-1], now))
+                if idle == patience or (avoids and far(least, left)):
+                    break
+            means, spreads = self._next(means, spreads, draws, looked.cost)
         return best
 
     def _next(self, means: Array, spreads: Array, draws: Array, cost: Array) -> tuple[Array, Array]:
@@ -183,46 +207,107 @@ class Task:
         good = least <= 4.0 * least.min() + 1e-9
         return means[good], spreads[good]
 
-    def _cost(self, plan: Plan, rows: Array) -> tuple[Array, Array, Driven]:
-        """What is minimised, the deepest place (N,), and the trajectories."""
-        self.iterations += 1
-        driven = self.drive(plan, rows, self.car if plan.steers else self.exact)
-        total, most = self.coarse.excess(driven)
-        cost = total + _DEEPEST * most + _EFFORT * _effort(driven)
-        if not plan.steers:
-            fast = self.coarse.overload(driven)
-            cost, most = cost + fast, np.maximum(most, fast)
-        return cost, most, driven
+    def _look(self, plan: Plan, rows: Array) -> Looked:
+        """The trajectories (N,), until all have met something, and as long again.
 
-    def _best(self, plan: Plan, rows: Array, cost: Array, deep: Array, driven: Driven) -> Shot:
-        """The best of the trajectories, by a closer look at the cheapest and the least deep of them."""
-        order = (values.argsort(kind="stable") for values in (cost, deep))
+        What comes then saves nobody, and hardly says who of them comes closest to getting through.
+        """
+        self.iterations += 1
+        ends = [self.steps.count]
+        if self.coarse.adds_up:
+            stages = (steps_until(t, self.steps.dt) for t in _STAGES)
+            ends = [*(k for k in stages if 0 < k < ends[0]), *ends]
+        total, most, fast = np.zeros((3, len(rows)))
+        begun, enough = 0, False
+        parts: list[Driven] = []
+        for part in self._driven(plan, rows, self.car, ends):
+            added, deepest = self.coarse.excess(part, begun)
+            total, most = total + added, np.maximum(most, deepest)
+            if not plan.steers:
+                fast = np.maximum(fast, self.coarse.overload(part))
+            parts.append(part)
+            begun = ends[len(parts) - 1]
+            if enough:
+                break
+            enough = bool(np.maximum(most, fast).all())
+        driven = reduce(Driven.then, parts)
+        effort = effort_of(driven)
+        cost = total + _DEEPEST * most + fast + _EFFORT * effort
+        return Looked(cost, np.maximum(most, fast), effort, driven)
+
+    def _best(self, plan: Plan, rows: Array, looked: Looked) -> Shot:
+        """The best of the cheapest and the least deep ones; a closer look at those that seem clear."""
+        order = (values.argsort(kind="stable") for values in (looked.cost, looked.deep))
         few = np.unique(np.concatenate([some[: self.config.elite] for some in order]))
-        some = driven.take(few)
-        most = self.fine.excess(some)[1]
-        if not plan.steers:
-            most = np.maximum(most, self.fine.overload(some))
+        most, effort = looked.deep[few], looked.effort[few]
         clear = np.flatnonzero(most <= 0.0)
         if len(clear):
-            most[clear] = self._closely(plan, rows[few[clear]])
-        k = int(np.lexsort((_effort(some), most))[0])
-        return Shot(rows[few[k : k + 1]], float(cost[few[k]]), float(most[k]))
+            clear = clear[effort[clear].argsort(kind="stable")]
+            most[clear] = self._from_near(plan, rows[few[clear]], looked.driven.take(few[clear]))
+        k = int(np.lexsort((effort, most))[0])
+        reached = looked.driven.a.shape[1]
+        return Shot(rows[few[k : k + 1]], float(looked.cost[few[k]]), float(most[k]), reached)
 
-    def _closely(self, plan: Plan, rows: Array) -> Array:
-        """What else keeps trajectories (N,) from being found, as metres; the next ones keep more from it."""
-        exact = self.drive(plan, rows, self.exact)
-        most = np.maximum(self.fine.excess(exact)[1], _LITTLE * self.on_map.off_the_map(exact))
+    def _from_near(self, plan: Plan, rows: Array, driven: Driven) -> Array:
+        """What keeps trajectories (N,) that seem clear from being found, as metres: until one is found.
+
+        The gentlest ones, which come first, mostly are what they seem to be.
+        """
+        most = np.zeros(len(rows))
+        why: set[_Why] = set()
+        for part in np.split(np.arange(len(rows)), [1]):
+            if not len(part):
+                continue
+            some = driven.take(part)
+            most[part] = self.fine.excess(some)[1]
+            if not plan.steers:
+                most[part] = np.maximum(most[part], self.fine.overload(some))
+            part = part[most[part] <= 0.0]
+            # Who is off the road as driven here is off it as driven exactly.
+            most[part] = _LITTLE * self.on_map.off_the_map(driven.take(part))
+            if most[part].any():
+                why.add(_Why.ROAD)
+            if len(part := part[most[part] <= 0.0]):
+                most[part] = self._closely(plan, rows[part], why)
+                if not most[part].all():
+                    return most
+        if plan.steers:
+            self._keep_more(why)
+        return most
+
+    def _closely(self, plan: Plan, rows: Array, why: set[_Why]) -> Array:
+        """What else keeps trajectories (N,) from being found, as metres, and why."""
+        exact = self._exactly(plan, rows)
+        most = self.fine.excess(exact)[1]
+        if not plan.steers:
+            most = np.maximum(most, self.fine.overload(exact))
+        if most.any():
+            why.add(_Why.PLACE)
+        clear = np.flatnonzero(most <= 0.0)
+        most[clear] = _LITTLE * self.on_map.off_the_map(exact.take(clear))
+        if most[clear].any():
+            why.add(_Why.ROAD)
         if not plan.steers:
             return np.asarray(most)
-        if most.all():  # the lateral room is a table, and the road is not
-            self.coarse = replace(self.coarse, edge=self.coarse.edge + _EDGE)
         for k in np.flatnonzero(most <= 0.0).tolist():
             if self._strains(curve_of(self.problem, exact.take(np.array([k])), self.exact)):
                 most[k] = _LITTLE
-        if most.all():  # where the axis bends sharply, steps and quintics follow it less closely
+                why.add(_Why.STRAIN)
+        return np.asarray(most)
+
+    def _keep_more(self, why: set[_Why]) -> None:
+        """Let the next trajectories keep more from what the closer look has found."""
+        edge, spare = self.coarse.edge, self.coarse.spare
+        if _Why.ROAD in why:  # the lateral room is a table, and the road is not
+            edge += _EDGE
+        if _Why.PLACE in why:  # what is looked at has been driven by a cheaper rule
+            spare += _INCH
+        if (edge, spare) != (self.coarse.edge, self.coarse.spare):
+            self.coarse = replace(self.coarse, edge=edge, spare=spare)
+        if _Why.STRAIN in why:  # where the axis bends sharply, steps and quintics follow it less closely
             limits = self.car.limits.reserving(_MORE)
             self.car, self.exact = replace(self.car, limits=limits), replace(self.exact, limits=limits)
-        return np.asarray(most)
+            self._last = None
 
     def _strains(self, curve: Curve) -> bool:
         """Whether a curve asks for more than the limits, between the steps or by its own derivatives."""
@@ -242,20 +327,3 @@ def _slip(problem: RepairProblem, vehicle: Vehicle) -> float:
         return float(np.arcsin(np.clip(vehicle.rear * kappa, -0.9, 0.9)))
     path = shapes.frame.cartesian(problem.reference.sample(times[-_HISTORY:]))
     return float(body_angles(path, vehicle)[0][-1])
-
-
-def _effort(driven: Driven) -> Array:
-    """How much is asked of the vehicle (N,): mean squares of both accelerations."""
-    across = driven.v[:, :-1] * driven.rate
-    return np.asarray((driven.a**2).mean(axis=1) + (across**2).mean(axis=1))
-
-
-def _apart(rows: Array, cost: Array, count: int) -> Array:
-    """The cheapest rows (count, D) of which no two are much alike."""
-    chosen: list[int] = []
-    for k in cost.argsort(kind="stable").tolist():
-        if all(np.abs(rows[k] - rows[other]).max() > 0.9 for other in chosen):
-            chosen.append(k)
-        if len(chosen) == count:
-            break
-    return np.asarray(rows[chosen])
