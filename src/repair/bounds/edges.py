@@ -13,6 +13,7 @@ from repair.arrays import Array
 __all__ = ["no_road"]
 
 _APART = 0.05  # pieces keep this far from the road [m]
+_BESIDE = 2.0  # how far beyond what is looked at the road is known [m]
 _SMALL = 0.1  # pieces of less than this are left out [m²]
 _COARSE = 0.05  # by how much outlines are simplified [m]
 _INWARDS = 1e-3  # by how much pieces are smaller than what was found to be no road [m]
@@ -38,10 +39,11 @@ def no_road(region: Any, lanelets: Iterable[Any], centre: Array, around: float, 
     import shapely
 
     square = shapely.box(*(centre - around), *(centre + around))
+    wide = shapely.buffer(square, _BESIDE)
     rings = (np.concatenate((a.left_vertices, a.right_vertices[::-1]))[:, :2] for a in lanelets)
-    drawn = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 2]
-    wide = shapely.buffer(square, 2.0)
-    near = shapely.intersection(shapely.union_all([region, *drawn]), wide)
+    near_by = (ring for ring in rings if len(ring) > 2 and _reaches(ring, centre, around + _BESIDE))
+    drawn = [shapely.make_valid(shapely.Polygon(ring)) for ring in near_by]
+    near = shapely.union_all(shapely.intersection(np.array([region, *drawn]), wide))
     kept = shapely.buffer(near, margin + _APART)
     outside = shapely.difference(square, shapely.simplify(shapely.buffer(kept, _COARSE), _COARSE))
     shapely.prepare(kept)
@@ -56,6 +58,12 @@ def no_road(region: Any, lanelets: Iterable[Any], centre: Array, around: float, 
             ring = shapely.get_coordinates(shapely.normalize(inner).exterior)[:-1][::-1]
             pieces.append(np.asarray(ring, dtype=np.float64))
     return pieces
+
+
+def _reaches(ring: Array, centre: Array, around: float) -> bool:
+    """Whether the box around a ring (K, 2) meets a square."""
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    return bool((low <= centre + around).all() and (high >= centre - around).all())
 
 
 def _joined(pieces: list[Any], kept: Any) -> list[Any]:

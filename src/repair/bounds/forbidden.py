@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ SPAN = 0.2
 _KEPT = 1e-5  # by how much a witness has to be inside [m]
 _COARSE = 0.04  # corners that reach no farther than this are left out [m]
 _FEWEST, _MOST = 3, 8  # corners
+_GRID = np.array([(a, b) for a in (0.0, 0.25, 0.5, 0.75, 1.0) for b in (0.0, 0.5, 1.0)])
 _INWARDS = (0.004, 0.02, 0.06, 0.15, 0.35)  # shares of the way to the middle by which corners are moved
 
 
@@ -46,13 +48,13 @@ def forbidden(shape: Array, corners: Array, low: float, high: float) -> Array | 
     polygon = _around(shape, corners, angles)
     if len(polygon) < _FEWEST:
         return None
-    middle = polygon.mean(axis=0)
-    if not meets_throughout(middle[None], shape, corners, angles)[0]:
+    middle, witnesses = polygon.mean(axis=0), _Witnesses.of(shape, corners, angles)
+    if not witnesses.meet(middle[None])[0]:
         return None
     points, open_ = polygon.copy(), np.ones(len(polygon), dtype=np.bool_)
     for share in _INWARDS:
         points[open_] = middle + (1.0 - share) * (polygon[open_] - middle)
-        open_[open_] = ~meets_throughout(points[open_], shape, corners, angles)
+        open_[open_] = ~witnesses.meet(points[open_])
         if not open_.any():
             break
     points = points[~open_]
@@ -71,32 +73,60 @@ def meets_throughout(points: Array, shape: Array, corners: Array, angles: Array)
     on an arc, whose chord is in the shape, and the body contains that point shortened), or if one point of
     the shape is at both in the body shrunk by cos d. Tried are some points of either.
     """
-    normals, offsets = _sides(shape)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    turn = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    shrunk = math.cos(0.5 * float(angles[1] - angles[0]))
-    met = np.zeros((len(points), len(angles) - 1), dtype=np.bool_)
-    # points of the shape, seen from the body: (P, A, Q)
-    inner = np.concatenate((shape, 0.5 * (shape + np.roll(shape, -1, axis=0)), shape.mean(axis=0)[None]))
-    away = inner[None] - points[:, None]
-    u = away[:, None, :, 0] * turn[None, :, :1] + away[:, None, :, 1] * turn[None, :, 1:]
-    w = away[:, None, :, 1] * turn[None, :, :1] - away[:, None, :, 0] * turn[None, :, 1:]
-    inside = (u >= shrunk * low[0] + _KEPT) & (u <= shrunk * high[0] - _KEPT)
-    inside &= (w >= shrunk * low[1] + _KEPT) & (w <= shrunk * high[1] - _KEPT)
-    met |= (inside[:, 1:] & inside[:, :-1]).any(axis=2)
-    if met.all():
+    return _Witnesses.of(shape, corners, angles).meet(points)
+
+
+class _Witnesses(NamedTuple):
+    """Points of a shape and of a body that may be in the other one at headings (A,), wherever the body is.
+
+    Attributes
+    ----------
+    inner : (Q, 2) array
+        Of the shape.
+    turn : (A, 2) array
+        Cosine and sine of the headings.
+    low, high : (2,) array
+        Between which they are in the body, seen from it, shrunk.
+    normals : (K, 2) array
+        Of the shape's sides.
+    level : (K, A, B) array
+        By how much those of the body, at the origin, are inside of the sides.
+    """
+
+    inner: Array
+    turn: Array
+    low: Array
+    high: Array
+    normals: Array
+    level: Array
+
+    @classmethod
+    def of(cls, shape: Array, corners: Array, angles: Array) -> _Witnesses:
+        """The points that are tried."""
+        normals, offsets = _sides(shape)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        turn = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        shrunk = math.cos(0.5 * float(angles[1] - angles[0]))
+        inner = np.concatenate((shape, 0.5 * (shape + np.roll(shape, -1, axis=0)), shape.mean(axis=0)[None]))
+        body = low + _GRID * (high - low)
+        x = body[None, :, 0] * turn[:, :1] - body[None, :, 1] * turn[:, 1:]
+        y = body[None, :, 1] * turn[:, :1] + body[None, :, 0] * turn[:, 1:]
+        away = normals[:, :1, None] * x + normals[:, 1:, None] * y
+        level = offsets[:, None, None] - away
+        return cls(inner, turn, shrunk * low + _KEPT, shrunk * high - _KEPT, normals, level)
+
+    def meet(self, points: Array) -> npt.NDArray[np.bool_]:
+        """See :func:`meets_throughout`."""
+        turn, away = self.turn, self.inner[None] - points[:, None]  # (P, A, Q)
+        u = away[:, None, :, 0] * turn[None, :, :1] + away[:, None, :, 1] * turn[None, :, 1:]
+        w = away[:, None, :, 1] * turn[None, :, :1] - away[:, None, :, 0] * turn[None, :, 1:]
+        inside = (u >= self.low[0]) & (u <= self.high[0]) & (w >= self.low[1]) & (w <= self.high[1])
+        met = (inside[:, 1:] & inside[:, :-1]).any(axis=2)
+        if not met.all():
+            over = points @ self.normals.T  # (P, K)
+            inside = (self.level[None] - over[:, :, None, None]).min(axis=1) >= _KEPT
+            met |= (inside[:, 1:] & inside[:, :-1]).any(axis=2)
         return np.asarray(met.all(axis=1))
-    grid = np.array([(a, b) for a in (0.0, 0.25, 0.5, 0.75, 1.0) for b in (0.0, 0.5, 1.0)])
-    body = low + grid * (high - low)
-    x = body[None, :, 0] * turn[:, :1] - body[None, :, 1] * turn[:, 1:]
-    y = body[None, :, 1] * turn[:, :1] + body[None, :, 0] * turn[:, 1:]
-    # by how much points of the body are inside of each side of the shape: (P, A, B)
-    level = np.full((len(points), *x.shape), np.inf)
-    for n, c in zip(normals, offsets, strict=True):
-        np.minimum(level, c - (points @ n)[:, None, None] - (x * n[0] + y * n[1])[None], out=level)
-    inside = level >= _KEPT
-    met |= (inside[:, 1:] & inside[:, :-1]).any(axis=2)
-    return np.asarray(met.all(axis=1))
 
 
 def _sides(shape: Array) -> tuple[Array, Array]:
@@ -116,17 +146,21 @@ def _around(shape: Array, corners: Array, angles: Array) -> Array:
     x = corners[:, :1] * c - corners[:, 1:] * s  # (4, F)
     y = corners[:, :1] * s + corners[:, 1:] * c
     least = np.max(-(normals[:, :1, None] * x + normals[:, 1:, None] * y), axis=1).min(axis=1)
-    planes = [(n[0], n[1], h) for n, h in zip(normals, offsets + least, strict=True)]
     half = 0.5 * float(angles[1] - angles[0])
     loss = 1.0 / math.cos(half) - 1.0
     low, high = corners.min(axis=0), corners.max(axis=0)
-    for angle in angles:
-        cos, sin = math.cos(angle), math.sin(angle)
-        for nx, ny, off in (
-            (cos, sin, high[0]), (-cos, -sin, -low[0]), (-sin, cos, high[1]), (sin, -cos, -low[1]),
-        ):  # fmt: skip
-            planes.append((-nx, -ny, float(np.max(-shape @ (nx, ny))) + off * (1.0 - loss)))
-    polygon = _intersection(planes)
+    # of the body's sides at each of the angles
+    cos, sin = np.cos(angles), np.sin(angles)
+    out: Array = (
+        np.array(((cos, sin), (-cos, -sin), (-sin, cos), (sin, -cos))).transpose(2, 0, 1).reshape(-1, 2)
+    )
+    off = np.tile((high[0], -low[0], high[1], -low[1]), len(angles)) * (1.0 - loss)
+    planes = np.column_stack((
+        np.concatenate((normals, -out)),
+        np.concatenate((offsets + least, np.max(out @ -shape.T, axis=1) + off)),
+    ))  # fmt: skip
+    order = np.arctan2(planes[:, 1], planes[:, 0]).argsort(kind="stable")
+    polygon = _intersection(planes[order].tolist())
     return _coarse(polygon) if len(polygon) >= _FEWEST else np.empty((0, 2))
 
 
@@ -135,10 +169,10 @@ _Plane = tuple[float, float, float]
 
 
 def _intersection(planes: list[_Plane]) -> list[_Point]:
-    """Corners of the places with n x <= h for all planes (n, h), whose directions go all around; or none."""
+    """Corners of the places with n x <= h for planes (n, h) in the order of their directions; or none."""
     kept: deque[_Plane] = deque()
     points: deque[_Point] = deque()
-    for nx, ny, h in sorted(planes, key=lambda p: math.atan2(p[1], p[0])):
+    for nx, ny, h in planes:
         while points and nx * points[-1][0] + ny * points[-1][1] > h:
             points.pop()
             kept.pop()

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -116,13 +115,13 @@ class Motions:
         """Of the reference point at the start [m/s]."""
         return float(np.hypot(*self.velocity))
 
-    def slowest(self, t: float) -> float:
-        """Smallest speed until a time [s] after the start [m/s]."""
-        return max(self.speed - NEAR.speed - self.acceleration * t, 0.0)
+    def slowest(self, t: Array) -> Array:
+        """Smallest speed until times [s] after the start [m/s]."""
+        return np.asarray(np.maximum(self.speed - NEAR.speed - self.acceleration * t, 0.0))
 
-    def fastest(self, t: float) -> float:
-        """Largest speed until a time [s] after the start [m/s]."""
-        return self.speed + NEAR.speed + self.acceleration * t
+    def fastest(self, t: Array) -> Array:
+        """Largest speed until times [s] after the start [m/s]."""
+        return np.asarray(self.speed + NEAR.speed + self.acceleration * t)
 
     @cached_property
     def corners(self) -> Array:
@@ -143,13 +142,12 @@ class Motions:
         The velocity stays within A t of that at the start, so its direction within asin(A t / v0). The rate
         of turning is at most that of :meth:`_rate`, over small pieces at either end.
         """
-        fine = np.concatenate(
-            [[0.0], *(np.linspace(a, b, _FINE + 1)[1:] for a, b in pairwise(times.tolist()))]
-        )
-        pieces = list(zip(fine[:-1].tolist(), fine[1:].tolist(), strict=True))
+        shares = np.arange(_FINE) / _FINE
+        fine = np.append((times[:-1, None] + np.diff(times)[:, None] * shares).ravel(), times[-1])
+        begin, end = fine[:-1], fine[1:]
 
-        def turns(begin: float) -> Array:
-            angles = np.cumsum([(b - a) * self._rate(a, b, begin) for a, b in pieces])
+        def turns(spin: float) -> Array:
+            angles = np.cumsum((end - begin) * self._rate(begin, end, spin))
             return np.concatenate(([0.0], angles[_FINE - 1 :: _FINE])) * (1.0 + 1e-9)
 
         spin = abs(self.yaw_rate) + NEAR.rate
@@ -157,8 +155,7 @@ class Motions:
         left, right = turned, turned
         if self.rear:
             left, right = (turns(max(sign * self.yaw_rate, 0.0) + NEAR.rate) for sign in (1.0, -1.0))
-        slips = np.array([self._slip(a, b) for a, b in [(0.0, 0.0), *pieces]])
-        slip = np.maximum.accumulate(slips)[::_FINE]
+        slip = np.maximum.accumulate(self._slip(np.append(0.0, begin), np.append(0.0, end)))[::_FINE]
         gone = self.acceleration * times + NEAR.speed
         veer = np.where(gone < self.speed, np.arcsin(np.minimum(gone / max(self.speed, 1e-9), 1.0)), np.inf)
         if not self.rear:
@@ -178,56 +175,52 @@ class Motions:
         braking = np.full(len(forward), min(self.braking, self.acceleration))
         return Turning(low, high, turned, slip, course, veer + _ANGLE, forward, braking)
 
-    def _rate(self, start: float, end: float, begin: float) -> float:
-        """Bound on the rate of turning to one side [rad/s] between two times [s] after the start.
+    def _rate(self, start: Array, end: Array, begin: float) -> Array:
+        """Bound on the rate of turning to one side [rad/s] between two times [s] after the start (F,).
 
         ``begin`` is the rate to that side at the start, or 0. Of the rear axle: the largest of min(A / v,
         curvature v) over the speeds v that are possible. Of the middle: see :meth:`_across`.
         """
         a, most = self.acceleration, self.curvature * self.fastest(end)
         if self.rear:
-            return min(most, self._across(start, end, begin) / self.rear)
+            return np.asarray(np.minimum(most, self._across(start, end, begin) / self.rear))
         slow = self.slowest(end)
-        if slow >= math.sqrt(a / self.curvature):
-            return a / slow
-        return min(most, math.sqrt(a * self.curvature))
+        fast = slow >= math.sqrt(a / self.curvature)
+        return np.where(fast, a / np.maximum(slow, 1e-9), np.minimum(most, math.sqrt(a * self.curvature)))
 
-    def _across(self, start: float, end: float, begin: float) -> float:
-        """Bound on the speed w of the middle across the body to one side [m/s] between two times.
+    def _across(self, start: Array, end: Array, begin: float) -> Array:
+        """Bound on the speed w of the middle across the body to one side [m/s] between two times (F,).
 
         w = rear * rate, and dw/dt = a_n - (v_r / rear) w, where the acceleration across the body is at most
         A and the rear axle's speed v_r at least r. So w is at most what the linear equation with r gives,
         which is monotonic in time.
         """
-        return self._swing(start, end, begin, self._axle(end))
+        axle = self._axle(end)
+        return np.maximum(self._swing(start, begin, axle), self._swing(end, begin, axle))
 
-    def _swing(self, start: float, end: float, begin: float, axle: float) -> float:
-        most = 0.0
-        for t in (start, end):
-            decay = axle * t / self.rear
-            share = -math.expm1(-decay) / decay if decay > 1e-9 else 1.0
-            most = max(most, self.rear * begin * math.exp(-decay) + self.acceleration * t * share)
-        return most
+    def _swing(self, t: Array, begin: float, axle: Array) -> Array:
+        decay = axle * t / self.rear
+        share = np.where(decay > 1e-9, -np.expm1(-decay) / np.maximum(decay, 1e-9), 1.0)
+        return np.asarray(self.rear * begin * np.exp(-decay) + self.acceleration * t * share)
 
-    def _axle(self, t: float) -> float:
-        """Smallest speed of the rear axle [m/s] until a time after the start, of the middle's motions."""
-        slow = self.slowest(t)
+    def _axle(self, t: Array) -> Array:
+        """Smallest speed of the rear axle [m/s] until times after the start (F,), of the middle's motions."""
+        slow, spin = self.slowest(t), abs(self.yaw_rate) + NEAR.rate
         axle = slow * math.cos(self._largest_slip)
         for _ in range(4):
-            across = self._swing(0.0, t, abs(self.yaw_rate) + NEAR.rate, axle)
-            axle = max(axle, math.sqrt(max(slow * slow - across * across, 0.0)))
+            across = np.maximum(self._swing(t, spin, axle), self.rear * spin)
+            axle = np.maximum(axle, np.sqrt(np.maximum(slow * slow - across * across, 0.0)))
         return axle
 
     @cached_property
     def _largest_slip(self) -> float:
         return math.asin(min(self.rear * self.curvature, 1.0))
 
-    def _slip(self, start: float, end: float) -> float:
-        """Bound on the slip angle [rad] between two times [s] after the start."""
+    def _slip(self, start: Array, end: Array) -> Array:
+        """Bound on the slip angle [rad] between two times [s] after the start (F,)."""
         if not self.rear:
-            return 0.0
-        slow = self.slowest(end)
-        if slow <= 0.0:
-            return self._largest_slip
+            return np.zeros(len(end))
+        slow, most = self.slowest(end), self._largest_slip
         across = self._across(start, end, abs(self.yaw_rate) + NEAR.rate)
-        return min(self._largest_slip, math.asin(min(across / slow, 1.0))) + _ANGLE
+        slip = np.arcsin(np.minimum(across / np.maximum(slow, 1e-9), 1.0))
+        return np.where(slow > 0.0, np.minimum(slip, most) + _ANGLE, most)

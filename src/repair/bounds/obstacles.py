@@ -9,7 +9,7 @@ import numpy as np
 
 from repair.arrays import Array
 from repair.scene.traffic.shapes import off_centre
-from repair.world.tracks import BEFORE, CIRCLE, INSTANT, MOVING, POLYGON, Index, Track, tracks_of
+from repair.world.tracks import BEFORE, INSTANT, MOVING, POLYGON, RECTANGLE, Index, Track, tracks_of
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
@@ -46,7 +46,8 @@ def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Oc
     both sides of theirs: as :class:`repair.world.collision.CollisionWorld` has it. Polygons that do not
     move as one body count at the steps alone, and who is there in two readings counts in none.
     """
-    columns: list[Array] = []
+    columns: list[Array | None] = []  # None of a rectangle: all of them are laid out at once
+    rectangles: list[Array] = []
     owner: list[int] = []
     for index, obstacle in enumerate(obstacles):
         if not _one_reading(obstacle):
@@ -56,16 +57,26 @@ def occupied(obstacles: Sequence[Obstacle], n_samples: int, substeps: int) -> Oc
         if not held and tracks[0].mode != MOVING:
             tracks = tracks[:1]
         for track in tracks:
+            if track.kind == RECTANGLE:
+                rectangles.append(track.rows)
+                columns.append(None)
+                owner.append(index)
+                continue
             steps_alone = not held and track.mode == BEFORE
             for part in _parts(track, n_samples, substeps if steps_alone else 1):
                 inside = part.mean(axis=1, keepdims=True)
                 columns.append(inside + (part - inside) * (1.0 - _INWARDS))
                 owner.append(index)
-    size = max((part.shape[1] for part in columns), default=3)
+    size = max((4 if part is None else part.shape[1] for part in columns), default=3)
     vertices = np.full((n_samples, len(columns), size, 2), np.nan)
-    for m, part in enumerate(columns):
-        vertices[:, m, : part.shape[1]] = part
-        vertices[:, m, part.shape[1] :] = part[:, -1:]
+    if rectangles:
+        drawn = [m for m, part in enumerate(columns) if part is None]
+        corners = _corners(np.array(rectangles))
+        vertices[:, drawn, :4], vertices[:, drawn, 4:] = corners, corners[:, :, -1:]
+    for m, shape in enumerate(columns):
+        if shape is not None:
+            vertices[:, m, : shape.shape[1]] = shape
+            vertices[:, m, shape.shape[1] :] = shape[:, -1:]
     return Occupied(vertices, np.array(owner, dtype=np.intp))
 
 
@@ -97,15 +108,19 @@ def _one_reading(obstacle: Obstacle) -> bool:
     return not any(shape is not None and off_centre(shape) for shape in shapes)
 
 
+def _corners(rows: Array) -> Array:
+    """Corners (I, M, 4, 2) of rectangles (M, I, 5), which are a little smaller."""
+    x, y, heading, a, b = rows.transpose(2, 1, 0)[..., None]
+    u, w = _CORNERS[:, 0] * (1.0 - _INWARDS) * a, _CORNERS[:, 1] * (1.0 - _INWARDS) * b
+    c, s = np.cos(heading), np.sin(heading)
+    return np.stack((x + c * u - s * w, y + s * u + c * w), axis=-1)
+
+
 def _parts(track: Track, n_samples: int, every: int) -> list[Array]:
-    """Each convex part of a track over the samples (I, K, 2); NaN where it is not there."""
+    """Each convex part of a track of circles or polygons over samples (I, K, 2); NaN where there is none."""
     if track.kind != POLYGON:
-        x, y, heading, a, b = track.rows.T
-        if track.kind == CIRCLE:
-            return [np.stack((x, y), axis=1)[:, None] + _AROUND * a[:, None, None]]
-        u, w = _CORNERS[:, 0] * a[:, None], _CORNERS[:, 1] * b[:, None]
-        c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
-        return [np.stack((x[:, None] + c * u - s * w, y[:, None] + s * u + c * w), axis=2)]
+        x, y, _, radius, _ = track.rows.T
+        return [np.stack((x, y), axis=1)[:, None] + _AROUND * radius[:, None, None]]
     count = max((len(p) for p in track.polygons), default=0)
     size = max((len(v) for p in track.polygons for v in p), default=3)
     made = [np.full((n_samples, size, 2), np.nan) for _ in range(count)]

@@ -210,7 +210,15 @@ class _Search:
         score = depth[met[:, 0], met[:, 1]] / (self.reach[met[:, 0]] + 0.05)
         order = met[np.argsort(-score)]
         best, found = 0.0, -1
-        for i, m in order[:_TRIED].tolist():
+        i, m = order[:_TRIED].T
+        # The body is no deeper in what is forbidden for all headings than in what is for one of them.
+        deepest = np.min(
+            [self._deep(place[i], h[i], self.normal[i, m], self.level[i, m], self.shapes[i, m])
+             for h in (heading, node.low, node.high)], axis=0,
+        )  # fmt: skip
+        for (i, m), most in zip(order[:_TRIED].tolist(), deepest.tolist(), strict=True):
+            if most <= deep or most / (self.reach[i] + 0.05) <= best:
+                continue
             cut = self._cut(i, m, float(node.low[i]), float(node.high[i]))
             if cut is None:
                 continue
@@ -227,21 +235,23 @@ class _Search:
 
     def _depths(self, place: Array, heading: Array) -> Array:
         """How deep the body is in each shape at each instant (I, M) [m]; negative where it is clear."""
-        c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
-        corners = self.motions.corners
-        x = place[:, :1] + c * corners[:, 0] - s * corners[:, 1]  # (I, 4)
-        y = place[:, 1:] + s * corners[:, 0] + c * corners[:, 1]
-        n = self.normal
-        least = np.min(n[..., :1] * x[:, None, None, :] + n[..., 1:] * y[:, None, None, :], axis=3)
-        depth = np.min(self.level - least, axis=2)
-        away = self.shapes - place[:, None, None]
-        c, s = c[..., None], s[..., None]
+        deep = self._deep(place[:, None], heading[:, None], self.normal, self.level, self.shapes)
+        return np.where(self.there, deep, -np.inf)
+
+    def _deep(self, place: Array, heading: Array, normal: Array, level: Array, shape: Array) -> Array:
+        """The same (...) of places (..., 2), headings (...), and the sides (..., K) of shapes (..., K, 2)."""
+        corners, c, s = self.motions.corners, np.cos(heading)[..., None], np.sin(heading)[..., None]
+        x = place[..., :1] + c * corners[:, 0] - s * corners[:, 1]  # (..., 4)
+        y = place[..., 1:] + s * corners[:, 0] + c * corners[:, 1]
+        least = np.min(normal[..., :1] * x[..., None, :] + normal[..., 1:] * y[..., None, :], axis=-1)
+        depth = np.min(level - least, axis=-1)
+        away = shape - place[..., None, :]
         u = c * away[..., 0] + s * away[..., 1]
         w = c * away[..., 1] - s * away[..., 0]
         low, high = corners.min(axis=0), corners.max(axis=0)
         for seen, a, b in ((u, low[0], high[0]), (w, low[1], high[1])):
-            depth = np.minimum(depth, np.minimum(seen.max(axis=2) - a, b - seen.min(axis=2)))
-        return np.where(self.there, depth, -np.inf)
+            depth = np.minimum(depth, np.minimum(seen.max(axis=-1) - a, b - seen.min(axis=-1)))
+        return np.asarray(depth)
 
     def _cut(self, i: int, m: int, low: float, high: float) -> int | None:
         """Place in ``cuts`` of the polygon for a shape at an instant; None where there is none."""
