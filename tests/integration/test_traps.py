@@ -421,6 +421,15 @@ def test_zero_length_and_duplicate_points(load: Any) -> None:
     assert outcome(scene).f_ttr == outcome(plain).f_ttr
 
 
+def test_exchanged_bounds_are_named(load: Any) -> None:
+    along, there, back = range(0, 401, 20), [3.5] * 21, [7.0] * 21
+    proper = lanelet(1, along, [0.0] * 21) + lanelet(2, along[::-1], back, width=-3.5)
+    said = "lanelet {} is drawn with left and right bound exchanged; the checker may see no road there"
+    notes = load(scenario(road=proper + lanelet(3, along, there))).notes
+    assert not any("exchanged" in note for note in notes)
+    assert said.format(3) in load(scenario(road=proper + lanelet(3, along, there, width=-3.5))).notes
+
+
 def test_no_usable_lanelet(refused: Any) -> None:
     refused(scenario(road=lanelet(7, [80] * 5, [0.0] * 5)), "no lanelet that could be driven on")
     refused(scenario(road=""), "no lanelet|cannot read")

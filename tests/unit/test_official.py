@@ -66,7 +66,7 @@ def beside(states):
 
 def off_the_road(states):
     for state in states:
-        state.position = np.add(state.position, (0.0, 4.0))
+        state.position = np.add(state.position, (0.0, 2.0))
 
 
 def jumps(states):

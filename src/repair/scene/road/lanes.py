@@ -56,7 +56,7 @@ def lanes_of(network: Any) -> tuple[dict[int, Lane], list[str]]:
     lanes : dict
         By id.
     notes : list of str
-        Which lanelets were left out, and why.
+        Which lanelets were left out, and why; and which have their left bound on their right.
 
     Raises
     ------
@@ -88,6 +88,11 @@ def lanes_of(network: Any) -> tuple[dict[int, Lane], list[str]]:
             neighbours.append(int(lanelet.adj_right))
         kinds = {kind.value for kind in (lanelet.lanelet_type or ())}
         outline = shapely.Polygon(np.concatenate([left, right[::-1]]))
+        if outline.is_valid and outline.exterior.is_ccw:
+            notes.append(
+                f"lanelet {name} is drawn with left and right bound exchanged; "
+                "the checker may see no road there"
+            )
         lanes[name] = Lane(
             id=name,
             center=frozen(center),
