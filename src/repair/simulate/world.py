@@ -105,9 +105,8 @@ def widened(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple[O
     """
     if error <= 0.0:
         return obstacles
-    both = (displaced(obstacles, by, dt) for by in (error, -error))
-    moved = (zip(obstacles, there, strict=True) for there in both)
-    return (*obstacles, *(two for pairs in moved for one, two in pairs if two is not one))
+    ways = [(one, way) for one in obstacles if (way := _way(one)) is not None]
+    return (*obstacles, *(_displaced(one, way, by, dt) for by in (error, -error) for one, way in ways))
 
 
 def displaced(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple[Obstacle, ...]:
@@ -121,28 +120,29 @@ def displaced(obstacles: tuple[Obstacle, ...], error: float, dt: float) -> tuple
     dt : float
         [s].
     """
-    return tuple(_displaced(one, error, dt) for one in obstacles)
+    ways = ((one, _way(one)) for one in obstacles)
+    return tuple(one if way is None else _displaced(one, way, error, dt) for one, way in ways)
 
 
-def _displaced(one: Obstacle, error: float, dt: float) -> Obstacle:
+def _way(one: Obstacle) -> tuple[Array, Array] | None:
+    """How far an obstacle has come at each step (T,) [m], and its directions (T, 2); None where it stays."""
     places = one.states[:, :2]
     if one.role in _STATED or not np.isfinite(places).all():
-        return one
-    arc = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
+        return None
+    arc = np.append(0.0, np.cumsum(np.hypot(*(places[1:] - places[:-1]).T)))
     if arc[-1] < _MOVES:
-        return one
-    off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
-    return _along(one, np.maximum.accumulate(np.maximum(arc + off, 0.0)) - arc)
-
-
-def _along(one: Obstacle, by: Array) -> Obstacle:
-    """An obstacle shifted along its headings by distances (T,) [m]."""
+        return None
     heading = np.nan_to_num(one.states[:, 2])
-    shift = by[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    return arc, np.column_stack([np.cos(heading), np.sin(heading)])
 
-    def shifted(table: Array | None) -> Array | None:
-        if table is None:
-            return None
+
+def _displaced(one: Obstacle, way: tuple[Array, Array], error: float, dt: float) -> Obstacle:
+    """An obstacle shifted along its headings."""
+    arc, direction = way
+    off = 0.5 * error * (np.arange(len(arc)) * dt) ** 2
+    shift = (np.maximum.accumulate(np.maximum(arc + off, 0.0)) - arc)[:, None] * direction
+
+    def shifted(table: Array) -> Array:
         found = table.copy()
         found[:, :2] += shift
         return found
@@ -150,8 +150,8 @@ def _along(one: Obstacle, by: Array) -> Obstacle:
     return replace(
         one,
         vertices=one.vertices + shift[:, None],
-        rectangles=shifted(one.rectangles),
-        circles=shifted(one.circles),
+        rectangles=None if one.rectangles is None else shifted(one.rectangles),
+        circles=None if one.circles is None else shifted(one.circles),
         polygons=tuple(tuple(p + shift[k] for p in parts) for k, parts in enumerate(one.polygons)),
-        states=np.column_stack([one.states[:, :2] + shift, one.states[:, 2:]]),
+        states=shifted(one.states),
     )
