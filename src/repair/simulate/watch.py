@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,14 +16,12 @@ from repair.curves.base import Curve, SplicedCurve
 from repair.cycle.asked import step_of
 from repair.cycle.kept import KeptRepair, verified_again
 from repair.cycle.repairer import Repairer
-from repair.cycle.searching import searched
 from repair.preparation import Phases, Prepared, laid_out
 from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
-from repair.search.result import Probe, SearchStatus
-from repair.search.rules import CONTIGUOUS
-from repair.search.settings import SearchConfig
-from repair.simulate.carried import Carried, Stint, carried_from
+from repair.search.result import SearchResult, SearchStatus
+from repair.simulate.carried import Carried
+from repair.simulate.share import ANEW, Share, Start
 from repair.timegrid import INSTANT
 
 __all__ = ["Found", "Looked", "Watch"]
@@ -171,154 +168,85 @@ class Watch(Repairer):
         shut : tuple of float, optional
             Times-to-repair at which nothing was found in this cycle [s].
         """
-        prepared, settings, begin = looked.prepared, self.config.search, time.perf_counter()
-        if limit is not None:
-            settings = replace(settings, time_limit=min(limit, settings.time_limit or limit))
-
-        def timely() -> SearchConfig:
-            """With what is left of a limit."""
-            if limit is None:
-                return settings
-            return replace(settings, time_limit=max(limit - (time.perf_counter() - begin), 1e-6))
-
+        prepared = looked.prepared
+        share = Share(prepared, self._backend, self.config.search, looked.now, limit)
         if visits is not None:
-            made = find(prepared, self._backend, settings=settings, visits=visits)
+            made = find(prepared, self._backend, settings=share.timely(), visits=visits)
             tried = sum(max(len(probe.tried), 1) for probe in made.probes)
             return _found(prepared, made.f_ttr, made.curve, False, made.complete, tried)
         last, carried, nothing = self._kept, self._carried, self._nothing
         self._carried = self._nothing = None
         kept = None if last is None else verified_again(last, prepared, looked.now)
+        until = -np.inf if kept is None else kept[0]
         enough, latest = enough or 0.0, np.inf if enough is None else enough + INSTANT  # a cycle ago
-        safe, on = kept is not None and kept[0] >= enough - INSTANT, None
+        on = None
         if carried is not None and looked.now - carried.now <= latest and (last is None or kept is not None):
-            on = carried.seen_from(looked.now, None if kept is None else kept[0])
-        if kept is not None and safe and on is None and latest < np.inf:
+            on = carried.seen_from(looked.now, None if kept is None else until)
+        if kept is not None and until >= enough - INSTANT and on is None and latest < np.inf:
             return _found(prepared, *kept, True, True)
-        contiguous = settings.rule in CONTIGUOUS
-        goes_round = solves is not None and contiguous and latest < np.inf
-        if looked.conflict.time == np.inf:
-            nothing = None
-        if goes_round and kept is None and nothing is not None and looked.now - nothing.now <= latest:
-            return self._once_more(looked, timely(), nothing, enough, solves or 0, shut)
-        if on is not None:
-            known, guess, above, stride = on
-        else:
-            known, guess, above, stride = None if kept is None else kept[0], None, None, None
-            if last is not None and kept is None and last.due(looked.now) >= 0.0:
-                guess = last.due(looked.now)
-        stint = Stint(solves, enough, best=-np.inf if known is None else known)
-        made = searched(
-            prepared, self._backend, timely(), known, guess, above=above, stride=stride,
-            on_probe=stint if contiguous else None,
-        )  # fmt: skip
-        best, complete = known if made.f_ttr is None else made.f_ttr, made.complete
-        if not complete:
-            self._carried = self._left_of(looked, made.probes, stint.ended, (known, above))
-            complete = stint.ended and self._carried is None
-        if stint.ended and best is None and not safe:
-            stint = Stint(0, enough, needed=True, spent=stint.spent)
-            nearer, step = min(probe.t_rep for probe in made.probes), settings.delta_t
-            at = float(np.ceil(enough / step - INSTANT)) * step
-            if at < nearer - INSTANT:
-                made = find(prepared, self._backend, settings=timely(), visits=(at,), on_probe=stint)
-            rest = None if self._carried is None else self._carried.seen_from(looked.now, None)
-            if made.curve is None and rest is not None:  # there is none to wait on: to its end, as it began
-                made = searched(
-                    prepared, self._backend, timely(), None, rest[1], above=rest[2], stride=rest[3],
-                    on_probe=stint,
-                )  # fmt: skip
-                self._carried, complete = None, made.complete
-                if stint.ended:
-                    self._carried = self._left_of(looked, made.probes, True, (None, rest[2]))
-                    complete = self._carried is None
-        least = -np.inf if kept is None else kept[0]
-        least = least if made.f_ttr is None else max(least, made.f_ttr)
-        if on is not None and contiguous and complete and least < enough - INSTANT:
-            # Nothing to wait on comes of it, and where nothing was in earlier cycles there may be by now.
-            stint = Stint(solves, enough, needed=True, best=least, spent=stint.spent)
-            known = least if least >= 0.0 else None
-            anew = searched(prepared, self._backend, timely(), known, None, on_probe=stint)
-            complete = anew.complete
-            if stint.ended:
-                self._carried = self._left_of(looked, anew.probes, True, (known, None))
-                complete = self._carried is None
-            made = made if anew.curve is None else anew
-        later = made.f_ttr is not None and (kept is None or made.f_ttr > kept[0])
+        goes_round = solves is not None and share.contiguous and latest < np.inf
+        again = nothing is not None and looked.now - nothing.now <= latest and looked.conflict.time < np.inf
+        if goes_round and kept is None and nothing is not None and again:
+            return self._once_more(share, nothing, enough, solves or 0, shut)
+        made = self._searched(share, on, kept, last, enough, solves)
+        self._carried = share.carried
+        later = made.f_ttr is not None and made.f_ttr > until
         if made.curve is not None and made.f_ttr is not None and later:
             self._kept = KeptRepair(made.curve, made.f_ttr, looked.now, prepared.scene.frame)
-            return _found(prepared, made.f_ttr, made.curve, False, complete, stint.spent)
+            return _found(prepared, made.f_ttr, made.curve, False, share.complete, share.spent)
         if kept is not None:
-            return _found(prepared, *kept, True, complete, stint.spent)
+            return _found(prepared, *kept, True, share.complete, share.spent)
         if made.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
-        if made.status is SearchStatus.NONE_FEASIBLE and goes_round and stint.spent > (solves or 0):
-            self._nothing = Carried(looked.now, np.inf, settings.delta_t, False)
-        return _found(prepared, made.f_ttr, None, False, complete, stint.spent)
+        if made.status is SearchStatus.NONE_FEASIBLE and goes_round and share.spent > (solves or 0):
+            self._nothing = Carried(looked.now, np.inf, self.config.search.delta_t, False)
+        return _found(prepared, made.f_ttr, None, False, share.complete, share.spent)
+
+    @staticmethod
+    def _searched(
+        share: Share, on: Start | None, kept: tuple[float, Curve] | None, last: KeptRepair | None,
+        enough: float, solves: int | None,
+    ) -> SearchResult:  # fmt: skip
+        """Where the last cycle ended, or from what is kept, or was, on; then for what has to be there."""
+        until = -np.inf if kept is None else kept[0]
+        start = on
+        if start is None:
+            due = -1.0 if last is None or kept is not None else last.due(share.now)
+            start = None if kept is None else until, due if due >= 0.0 else None, None, None
+        made = share.search(start, solves, enough, best=start[0])
+        if share.ended and made.f_ttr is None and start[0] is None and until < enough - INSTANT:
+            made = share.to_wait_on(made, enough)
+        least = until if made.f_ttr is None else max(until, made.f_ttr)
+        if on is not None and share.contiguous and share.complete and least < enough - INSTANT:
+            made = share.anew(made, least, enough, solves)
+        return made
 
     def _once_more(
-        self,
-        looked: Looked,
-        settings: SearchConfig,
-        nothing: Carried,
-        enough: float,
-        solves: int,
-        shut: tuple[float, ...],
+        self, share: Share, nothing: Carried, enough: float, solves: int, shut: tuple[float, ...]
     ) -> Found:
         """After a cycle that has found nothing: the places that decide what is done now, and some others.
 
         A repair that can be waited for, and one that begins at once; then the search is made as far as
         ``solves`` go, by one place at least, and the next cycle goes on with it.
         """
-        prepared, step, begin = looked.prepared, settings.delta_t, time.perf_counter()
-        places = (float(np.ceil(enough / step - INSTANT)) * step, 0.0)
-        end = self._end(looked)
-        first = tuple(t for t in places if t not in shut and (t < end - INSTANT or t <= 0.0))
-        stint = Stint(0, 0.0, needed=True)
-        made = find(prepared, self._backend, settings=settings, visits=first, on_probe=stint)
+        prepared, now, waits = share.prepared, share.now, share.first_to_wait(enough)
+        made = share.visit(
+            *(t for t in (waits, 0.0) if t not in shut and (t < share.end - INSTANT or t <= 0.0))
+        )
         if made.curve is not None:  # what is waited on; the round goes on: feasibility may have gaps
-            since = nothing.above - (looked.now - nothing.now)
-            carried: Carried | None = replace(nothing, now=looked.now, above=since)
+            carried: Carried | None = replace(nothing, now=now, above=nothing.above - (now - nothing.now))
         else:
-            on = nothing.seen_from(looked.now, None)
-            if on is None or (on[1] is not None and on[1] <= places[0] + INSTANT):  # the round is over
-                on = None, None, None, None
-            _, guess, above, stride = on
-            if settings.time_limit is not None:
-                left = max(settings.time_limit - (time.perf_counter() - begin), 1e-6)
-                settings = replace(settings, time_limit=left)
-            before = stint.spent
-            stint = Stint(max(solves - before, 1) + before, 0.0, spent=before)
-            made = searched(
-                prepared, self._backend, settings, None, guess, above=above, stride=stride, on_probe=stint
-            )  # fmt: skip
-            carried = None
-            if not made.complete:
-                carried = self._left_of(looked, made.probes, stint.ended, (None, above))
+            on = nothing.seen_from(now, None)
+            over = on is None or (on[1] is not None and on[1] <= waits + INSTANT)
+            made = share.search(ANEW if on is None or over else on, max(solves, share.spent + 1))
+            carried = share.carried
         if made.curve is None or made.f_ttr is None:
             self._kept = None
-            self._nothing = carried or Carried(looked.now, np.inf, step, False)
-            return _found(prepared, None, None, False, False, stint.spent)
+            self._nothing = carried or Carried(now, np.inf, share.settings.delta_t, False)
+            return _found(prepared, None, None, False, False, share.spent)
         self._carried = carried
-        self._kept = KeptRepair(made.curve, made.f_ttr, looked.now, prepared.scene.frame)
-        return _found(prepared, made.f_ttr, made.curve, False, carried is None, stint.spent)
-
-    def _left_of(
-        self,
-        looked: Looked,
-        probes: tuple[Probe, ...],
-        ended: bool,
-        before: tuple[float | None, float | None],
-    ) -> Carried | None:
-        """What is left for the next cycle of a search that was cut short."""
-        settings = self.config.search
-        if not ended and probes and not probes[-1].feasible:
-            probes = probes[:-1]  # nobody knows what would have come of the one that ran out of time
-        return carried_from(probes, looked.now, self._end(looked), settings.delta_t, before)
-
-    def _end(self, looked: Looked) -> float:
-        """Where the grid ends [s], excluded."""
-        upper = self.config.search.upper
-        return looked.conflict.time if upper is None else min(looked.conflict.time, upper)
+        self._kept = KeptRepair(made.curve, made.f_ttr, now, prepared.scene.frame)
+        return _found(prepared, made.f_ttr, made.curve, False, carried is None, share.spent)
 
 
 def _found(
