@@ -184,10 +184,11 @@ def test_after_a_cycle_with_nothing_the_search_goes_round(cases, rule, goes_roun
     ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
     traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
 
-    def cycle(shut=()):
+    def cycle(refused=()):
         asked.places.clear()
         looked = watch.look(case.curve, traffic=traffic, ego=ego)
-        return watch.answer(looked, enough=0.2, solves=solves, shut=shut), list(asked.places)
+        looked.refused.update(refused)
+        return watch.answer(looked, enough=0.2, solves=solves), list(asked.places)
 
     first, whole = cycle()
     assert first.curve is None
@@ -212,7 +213,9 @@ def test_after_a_cycle_with_nothing_the_search_goes_round(cases, rule, goes_roun
         downwards.append(pytest.approx(0.1 * k))
         k = order.send(False)
     assert others[: 2 * len(downwards)] == 2 * downwards
-    assert 0.0 not in cycle(shut=(0.0,))[1][:2]
+    assert 0.0 not in cycle(refused=(0.0,))[1][:2]
+    while watch._nothing.above < whole[0]:  # else the rest of the round is all that is looked at
+        cycle()
     asked.shut = np.inf  # a repair that can be waited for is found first, and the round goes on
     found, places = cycle()
     assert found.f_ttr == pytest.approx(0.2)
@@ -231,16 +234,39 @@ def test_where_nothing_to_wait_on_is_left_of_a_search_it_is_made_anew(cases):
     start = case.plan.scene.initial_state
     ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
     traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
-    looked = watch.look(case.curve, traffic=traffic, ego=ego)
     for _ in range(9):
-        found = watch.answer(looked, enough=1.4, solves=1)
+        found = watch.answer(watch.look(case.curve, traffic=traffic, ego=ego), enough=1.4, solves=1)
         assert found.f_ttr == pytest.approx(1.4)
         if watch._carried.above < 1.55:
             break
     assert not found.complete
     asked.shut = np.inf  # from now on there are repairs where nothing was found before
-    found = watch.answer(looked, enough=1.6, solves=1)
+    found = watch.answer(watch.look(case.curve, traffic=traffic, ego=ego), enough=1.6, solves=1)
     assert found.f_ttr >= 1.6 - 1e-9
+
+
+def test_where_nothing_can_be_waited_for_it_is_looked_for_before_that_alone(cases):
+    """And nowhere twice: not among what was looked at once."""
+    case = cases["scenario_1"]
+    start = case.plan.scene.initial_state
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
+    for shut in (0.2, -1.0):
+        watch = case.plan.hard.twin()
+        watch._backend = asked = Asked(watch._backend, shut + 1e-9)
+        looked = watch.look(case.curve, traffic=traffic, ego=ego)
+        assert (watch.answer(looked, visits=(0.0,)).curve is None) is (shut < 0.0)
+        found = watch.answer(looked, enough=1.4, solves=2)
+        assert found.complete
+        places = list(dict.fromkeys(asked.places))
+        assert max(places[places.index(1.4) + 1 :]) == 1.3
+        if shut > 0.0:
+            assert found.f_ttr == pytest.approx(shut)
+        else:
+            assert found.curve is None
+            count = len(asked.places)
+            assert watch.answer(looked, visits=(0.0, 1.3)).curve is None
+            assert len(asked.places) == count
 
 
 def test_each_drive_looks_for_itself(cases):

@@ -24,7 +24,7 @@ from repair.search.settings import SearchConfig
 from repair.situation import Situation
 from repair.timegrid import INSTANT, intervals
 
-__all__ = ["capabilities_of", "search_with"]
+__all__ = ["Refusing", "capabilities_of", "search_with"]
 
 
 def search_with(
@@ -119,10 +119,19 @@ class _Unaided(Guarded):
         self.capabilities = replace(backend.capabilities, helpers=helpers)
 
 
-class _Refusing:
-    """A backend that is not asked again at some t_rep [s]."""
+class Refusing:
+    """A backend that is not asked again at some t_rep.
 
-    def __init__(self, backend: RepairBackend, refused: Collection[float], onward: bool) -> None:
+    Parameters
+    ----------
+    backend : RepairBackend
+    refused : collection of float
+        Those at which nothing was found [s].
+    onward : bool
+        Nor at any later one.
+    """
+
+    def __init__(self, backend: RepairBackend, refused: Collection[float], onward: bool = False) -> None:
         self.name, self.capabilities = backend.name, backend.capabilities
         self._backend, self._refused = backend, refused
         self._from = min(refused, default=math.inf) if onward else math.inf
@@ -138,7 +147,7 @@ class _Refusing:
 
 
 def _refusing(make: Callable[[], RepairBackend], refused: Collection[float], onward: bool) -> RepairBackend:
-    return _Refusing(make(), refused, onward)
+    return Refusing(make(), refused, onward)
 
 
 def _told(on_probe: Callable[[Probe], None], by: str, probe: Probe) -> None:

@@ -192,9 +192,7 @@ class Sight:
     @cached_property
     def cycle(self) -> Found:
         """The F-TTR with the configured limits, as far as the decision to wait needs it."""
-        asked: Found | None = self.__dict__.get("first")
-        shut = asked is not None and asked.curve is None and asked.complete
-        return self._search(self.eyes.hard, self.looked, None, (0.0,) if shut else ())
+        return self._search(self.eyes.hard, self.looked, None)
 
     @cached_property
     def first(self) -> Found:
@@ -248,14 +246,13 @@ class Sight:
         watch: Watch,
         looked: Looked | None,
         visits: tuple[float, ...] | None,
-        shut: tuple[float, ...] = (),
     ) -> Found:
         assert looked is not None
         config = self.eyes.grounds.config.simulate
         left = None if config.solves is None else max(config.solves - self.eyes.solves, 1)
         found = self.eyes.timed(
             lambda: watch.answer(
-                looked, limit=config.deadline, visits=visits, enough=self.period, solves=left, shut=shut
+                looked, limit=config.deadline, visits=visits, enough=self.period, solves=left
             )
         )
         self.eyes.complete &= found.complete

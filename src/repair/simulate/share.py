@@ -14,6 +14,7 @@ from repair.preparation import Prepared
 from repair.search.result import Probe, SearchResult
 from repair.search.rules import CONTIGUOUS
 from repair.search.settings import SearchConfig
+from repair.search.several import Refusing
 from repair.simulate.carried import Carried, Stint, carried_from
 from repair.timegrid import INSTANT
 
@@ -39,6 +40,8 @@ class Share:
         When the cycle begins [s].
     limit : float or None
         All of it ends after so long [s].
+    refused : set of float
+        Times-to-repair at which nothing was found among what was looked at [s]: nobody is asked there again.
     carried : Carried or None
         What is left of the search that was made last.
     complete : bool
@@ -54,11 +57,15 @@ class Share:
     settings: SearchConfig
     now: float
     limit: float | None = None
+    refused: set[float] = field(default_factory=set)
     carried: Carried | None = field(default=None, init=False)
     complete: bool = field(default=True, init=False)
     ended: bool = field(default=False, init=False)
     spent: int = field(default=0, init=False)
     _begin: float = field(default_factory=time.perf_counter, init=False)
+
+    def __post_init__(self) -> None:
+        self.backend = Refusing(self.backend, self.refused)
 
     @property
     def contiguous(self) -> bool:
@@ -87,8 +94,14 @@ class Share:
         """Times-to-repair one after the other [s], until a repair is found."""
         stint = Stint(0, 0.0, needed=True, spent=self.spent)
         made = find(self.prepared, self.backend, settings=self.timely(), visits=places, on_probe=stint)
-        self.spent = stint.spent
+        self.spent, self.complete = stint.spent, made.complete or stint.ended
+        self._refuse(made, stint.ended)
         return made
+
+    def _refuse(self, made: SearchResult, ended: bool) -> None:
+        """Keep in mind where nothing was found; what ran out of time says nothing."""
+        known = made.probes if made.complete or ended else made.probes[:-1]
+        self.refused.update(probe.t_rep for probe in known if not probe.feasible)
 
     def search(
         self,
@@ -116,6 +129,7 @@ class Share:
             on_probe=stint if self.contiguous else None,
         )  # fmt: skip
         self.spent, self.ended, self.complete, self.carried = stint.spent, stint.ended, made.complete, None
+        self._refuse(made, stint.ended)
         if not made.complete:
             self.carried = self._left_of(made.probes, (known, above))
             self.complete = stint.ended and self.carried is None
@@ -131,16 +145,18 @@ class Share:
     def to_wait_on(self, made: SearchResult, enough: float) -> SearchResult:
         """After a search that was ended and has found nothing: a repair that can be waited for.
 
-        It is looked for at the first place of the grid that is so late [s], and where there is none the
-        search goes on until there is one, or to its end.
+        It is looked for at the first place of the grid that is so late [s]. Where there is none, there is
+        none later to a rule that takes feasibility to be contiguous, and the search ends before that place.
         """
-        at, visited = self.first_to_wait(enough), [probe.t_rep for probe in made.probes]
-        if at < min(visited) - INSTANT:
+        at, step = self.first_to_wait(enough), self.settings.delta_t
+        start = None if self.carried is None else self.carried.seen_from(self.now, None)
+        if at < min(probe.t_rep for probe in made.probes) - INSTANT:
             made = self.visit(at)
-        rest = None if self.carried is None else self.carried.seen_from(self.now, None)
-        if made.curve is not None or rest is None:
+            start = None, max(at - step, 0.0), at, step
+        self.complete = self.carried is None
+        if made.curve is not None or start is None:
             return made
-        return self.search(rest, 0, enough, needed=True)
+        return self.search(start, 0, enough, needed=True)
 
     def anew(self, made: SearchResult, least: float, enough: float, solves: int | None) -> SearchResult:
         """After one that was carried on and leaves nothing to wait on: from its beginning.

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from repair.api import find
 from repair.arrays import frozen
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
@@ -37,10 +36,13 @@ class Looked:
         When the cycle begins [s].
     prepared : Prepared
         Its ``conflict`` is that of the curve.
+    refused : set of float
+        Times-to-repair at which nothing was found by now [s].
     """
 
     now: float
     prepared: Prepared
+    refused: set[float] = field(default_factory=set, repr=False)
 
     @property
     def conflict(self) -> Conflict:
@@ -146,7 +148,6 @@ class Watch(Repairer):
         visits: tuple[float, ...] | None = None,
         enough: float | None = None,
         solves: int | None = None,
-        shut: tuple[float, ...] = (),
     ) -> Found:
         """The search among what was looked at.
 
@@ -156,8 +157,8 @@ class Watch(Repairer):
         limit : float, optional
             For how long is searched [s].
         visits : tuple of float, optional
-            Times-to-repair to try [s] instead of those of the search's rule; no earlier repair is then looked
-            at, nor is this one kept.
+            Times-to-repair to try [s] instead of those of the search's rule, until a repair is found; no
+            earlier one is then looked at, nor is this one kept.
         enough : float, optional
             Where an earlier repair still holds and can be waited for so long [s], nothing is searched.
         solves : int, optional
@@ -165,15 +166,12 @@ class Watch(Repairer):
             waited for: where none was found, it is looked for there, and then the search goes to its end.
             Where nothing to wait on comes of one that was carried on, it is made anew. After a cycle that
             has found nothing at all, the next ones make theirs in several cycles.
-        shut : tuple of float, optional
-            Times-to-repair at which nothing was found in this cycle [s].
         """
         prepared = looked.prepared
-        share = Share(prepared, self._backend, self.config.search, looked.now, limit)
+        share = Share(prepared, self._backend, self.config.search, looked.now, limit, looked.refused)
         if visits is not None:
-            made = find(prepared, self._backend, settings=share.timely(), visits=visits)
-            tried = sum(max(len(probe.tried), 1) for probe in made.probes)
-            return _found(prepared, made.f_ttr, made.curve, False, made.complete, tried)
+            made = share.visit(*visits)
+            return _found(prepared, made.f_ttr, made.curve, False, share.complete, share.spent)
         last, carried, nothing = self._kept, self._carried, self._nothing
         self._carried = self._nothing = None
         kept = None if last is None else verified_again(last, prepared, looked.now)
@@ -187,7 +185,7 @@ class Watch(Repairer):
         goes_round = solves is not None and share.contiguous and latest < np.inf
         again = nothing is not None and looked.now - nothing.now <= latest and looked.conflict.time < np.inf
         if goes_round and kept is None and nothing is not None and again:
-            return self._once_more(share, nothing, enough, solves or 0, shut)
+            return self._once_more(share, nothing, enough, solves or 0)
         made = self._searched(share, on, kept, last, enough, solves)
         self._carried = share.carried
         later = made.f_ttr is not None and made.f_ttr > until
@@ -221,18 +219,15 @@ class Watch(Repairer):
             made = share.anew(made, least, enough, solves)
         return made
 
-    def _once_more(
-        self, share: Share, nothing: Carried, enough: float, solves: int, shut: tuple[float, ...]
-    ) -> Found:
+    def _once_more(self, share: Share, nothing: Carried, enough: float, solves: int) -> Found:
         """After a cycle that has found nothing: the places that decide what is done now, and some others.
 
         A repair that can be waited for, and one that begins at once; then the search is made as far as
         ``solves`` go, by one place at least, and the next cycle goes on with it.
         """
         prepared, now, waits = share.prepared, share.now, share.first_to_wait(enough)
-        made = share.visit(
-            *(t for t in (waits, 0.0) if t not in shut and (t < share.end - INSTANT or t <= 0.0))
-        )
+        places = (waits, 0.0) if waits < share.end - INSTANT else (0.0,)
+        made = share.visit(*(t for t in places if t not in share.refused))
         if made.curve is not None:  # what is waited on; the round goes on: feasibility may have gaps
             carried: Carried | None = replace(nothing, now=now, above=nothing.above - (now - nothing.now))
         else:
