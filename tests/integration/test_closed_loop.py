@@ -245,28 +245,26 @@ def test_where_nothing_to_wait_on_is_left_of_a_search_it_is_made_anew(cases):
     assert found.f_ttr >= 1.6 - 1e-9
 
 
-def test_where_nothing_can_be_waited_for_it_is_looked_for_before_that_alone(cases):
-    """And nowhere twice: not among what was looked at once."""
+def test_nobody_is_asked_again_where_nothing_was_found_among_the_same(cases):
     case = cases["scenario_1"]
     start = case.plan.scene.initial_state
     ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
     traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
-    for shut in (0.2, -1.0):
-        watch = case.plan.hard.twin()
-        watch._backend = asked = Asked(watch._backend, shut + 1e-9)
-        looked = watch.look(case.curve, traffic=traffic, ego=ego)
-        assert (watch.answer(looked, visits=(0.0,)).curve is None) is (shut < 0.0)
-        found = watch.answer(looked, enough=1.4, solves=2)
-        assert found.complete
-        places = list(dict.fromkeys(asked.places))
-        assert max(places[places.index(1.4) + 1 :]) == 1.3
-        if shut > 0.0:
-            assert found.f_ttr == pytest.approx(shut)
-        else:
-            assert found.curve is None
-            count = len(asked.places)
-            assert watch.answer(looked, visits=(0.0, 1.3)).curve is None
-            assert len(asked.places) == count
+    watch, other = case.plan.hard.twin(), case.plan.hard.twin()
+    watch._backend, other._backend = (Asked(watch._backend, -1.0) for _ in range(2))
+    looked = watch.look(case.curve, traffic=traffic, ego=ego)
+    assert watch.answer(looked, visits=(0.0,)).curve is None
+    at_once = list(watch._backend.places)
+    assert set(at_once) == {0.0}
+    found, whole = watch.answer(looked), other.answer(other.look(case.curve, traffic=traffic, ego=ego))
+    assert (found.curve, found.complete, found.solves) == (None, True, whole.solves)
+    assert watch._backend.places[len(at_once) :] == [t for t in other._backend.places if t > 0.0]
+    count = len(watch._backend.places)
+    assert watch.answer(looked, visits=(0.0, *other._backend.places)).curve is None
+    assert len(watch._backend.places) == count
+    again = watch.look(case.curve, traffic=traffic, ego=ego)
+    assert watch.answer(again, visits=(0.0,)).curve is None
+    assert len(watch._backend.places) == count + len(at_once)
 
 
 def test_each_drive_looks_for_itself(cases):

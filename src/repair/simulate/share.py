@@ -145,18 +145,17 @@ class Share:
     def to_wait_on(self, made: SearchResult, enough: float) -> SearchResult:
         """After a search that was ended and has found nothing: a repair that can be waited for.
 
-        It is looked for at the first place of the grid that is so late [s]. Where there is none, there is
-        none later to a rule that takes feasibility to be contiguous, and the search ends before that place.
+        It is looked for at the first place of the grid that is so late [s], and where there is none the
+        search goes on until there is one, or to its end.
         """
-        at, step = self.first_to_wait(enough), self.settings.delta_t
-        start = None if self.carried is None else self.carried.seen_from(self.now, None)
+        at = self.first_to_wait(enough)
+        rest = None if self.carried is None else self.carried.seen_from(self.now, None)
         if at < min(probe.t_rep for probe in made.probes) - INSTANT:
             made = self.visit(at)
-            start = None, max(at - step, 0.0), at, step
         self.complete = self.carried is None
-        if made.curve is not None or start is None:
+        if made.curve is not None or rest is None:
             return made
-        return self.search(start, 0, enough, needed=True)
+        return self.search(rest, 0, enough, needed=True)
 
     def anew(self, made: SearchResult, least: float, enough: float, solves: int | None) -> SearchResult:
         """After one that was carried on and leaves nothing to wait on: from its beginning.
