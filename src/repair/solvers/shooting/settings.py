@@ -18,7 +18,10 @@ class ShootingConfig:
     means: int = setting(4, "manoeuvres that are followed side by side", low=1, high=100)
     iterations: int = setting(14, "at most", low=0, high=10_000)
     patience: int = setting(
-        3, "iterations in a row without progress, after which no more are made", low=1, high=10_000
+        3,
+        "iterations in a row without progress, after which no more are made; along the path one",
+        low=1,
+        high=10_000,
     )
     seed: int = setting(0, "of the random numbers; each solve begins with it again", low=0, high=2**31)
     slack: float = setting(
