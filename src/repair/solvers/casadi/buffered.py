@@ -39,6 +39,9 @@ class _Info(NamedTuple):
 class KeptBySize(Generic[Key, Made]):
     """Makes a thing for a key and keeps it; the ones not used for longest go when all take too much memory.
 
+    A search over a long time needs many things, and the next one of the same situation needs them again; a
+    process that goes from one situation to the next does not. So what was asked for lately may take more.
+
     Parameters
     ----------
     make : callable
@@ -46,17 +49,31 @@ class KeptBySize(Generic[Key, Made]):
         About how much memory a key's thing takes [MB].
     most : float
         How much all of them may take [MB]; the last one is kept however large it is.
+    idle : float, optional
+        How much they may take [MB] as long as one of them was not asked for lately; the same by default.
+    lately : int
+        So many askings ago and less is lately.
     """
 
-    def __init__(self, make: Callable[[Key], Made], size: Callable[[Key], float], most: float) -> None:
+    def __init__(
+        self,
+        make: Callable[[Key], Made],
+        size: Callable[[Key], float],
+        most: float,
+        idle: float | None = None,
+        lately: int = 32,
+    ) -> None:
         self._make, self._size, self._most = make, size, most
+        self._idle, self._lately = most if idle is None else idle, lately
         self._kept: OrderedDict[Key, Made] = OrderedDict()
+        self._asked: dict[Key, int] = {}  # the number of the last asking
         self._lock = threading.Lock()
         self._hits = self._misses = 0
 
     def __call__(self, key: Key) -> Made:
         """What was made for a key, made now if it is not there."""
         with self._lock:
+            self._asked[key] = self._hits + self._misses
             if key in self._kept:
                 self._hits += 1
                 self._kept.move_to_end(key)
@@ -65,9 +82,16 @@ class KeptBySize(Generic[Key, Made]):
         made = self._make(key)  # two threads may make the same thing; the first one is kept
         with self._lock:
             made = self._kept.setdefault(key, made)
-            while len(self._kept) > 1 and self.megabytes > self._most:
-                self._kept.popitem(last=False)
+            self._asked.setdefault(key, self._hits + self._misses)
+            while len(self._kept) > 1 and self.megabytes > self._allowed():
+                gone, _ = self._kept.popitem(last=False)
+                del self._asked[gone]
         return made
+
+    def _allowed(self) -> float:
+        """How much they may take now [MB]."""
+        first = self._hits + self._misses - self._asked[next(iter(self._kept))]
+        return self._most if first <= self._lately else self._idle
 
     @property
     def megabytes(self) -> float:
@@ -82,6 +106,7 @@ class KeptBySize(Generic[Key, Made]):
         """Forget all of them."""
         with self._lock:
             self._kept.clear()
+            self._asked.clear()
             self._hits = self._misses = 0
 
 

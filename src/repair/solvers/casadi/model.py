@@ -34,7 +34,7 @@ __all__ = ["TOLERANCE", "Model", "Solution", "build_model", "megabytes", "status
 
 TOLERANCE = 1e-6  #: largest violation of a curve that is called solved
 _DAQP_INFEASIBLE = -1
-_KEPT = 56.0  # of models, their NLPs included [MB]
+_KEPT, _IDLE = 72.0, 36.0  # of models, their NLPs included, and of those not asked for lately as well [MB]
 # What making a model takes [s], by entry of its matrix, and an NLP, by sample; CasADi cannot be interrupted.
 # Before any was made they are those of a slow machine.
 _LAID_OUT = Estimate(5e-7)
@@ -268,7 +268,7 @@ def megabytes(structure: Structure) -> float:
 
 #: The model of a structure, made at the first call and kept; :class:`repair.deadline.OutOfTime` if making it
 #: takes longer than there is time.
-build_model: KeptBySize[Structure, Model] = KeptBySize(Model, megabytes, _KEPT)
+build_model: KeptBySize[Structure, Model] = KeptBySize(Model, megabytes, _KEPT, _IDLE)
 
 
 def status_of(model: Model, solution: Solution) -> SolveStatus:
