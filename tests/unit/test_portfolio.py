@@ -58,23 +58,6 @@ class Checker:
         return Verdict()
 
 
-class Tightening(Source):
-    """With two notches of more room."""
-
-    notches = ((0.3, 0.6), (), ())
-
-
-class Until(Checker):
-    """Too close after a time, whatever is tightened."""
-
-    def __init__(self, latest):
-        self.latest = latest
-
-    def check(self, problem, curve):
-        late = problem.t_rep > self.latest + 1e-9
-        return Verdict((Violation(Reason.MARGIN, problem.t_rep),) if late else ())
-
-
 class TooLate:
     """Proves it from a time on, and says where it was asked."""
 
@@ -89,23 +72,12 @@ class TooLate:
         return min((t for t in times if self(t)), default=float("inf"))
 
 
-def asked(
-    *members,
-    rule="bisect",
-    ttc=2.0,
-    too_late=None,
-    hopeless=None,
-    visits=None,
-    source=None,
-    checker=None,
-    **keys,
-):
+def asked(*members, rule="bisect", ttc=2.0, too_late=None, hopeless=None, visits=None, **keys):
     """The search with these members among a conflict at ``ttc``."""
-    source = source or Source()
+    source = Source()
     situation = SimpleNamespace(
-        source=source, unguided=source, judge=checker or Checker(),
-        conflict=Conflict(ttc, "margin", contact_time=ttc),
-    )  # fmt: skip
+        source=source, unguided=source, judge=Checker(), conflict=Conflict(ttc, "margin", contact_time=ttc)
+    )
     named = {member.name: member for member in members}
     whole = SimpleNamespace(capabilities=Capabilities(members=lambda: named))
     settings = SearchConfig(rule=rule, delta_t=STEP, **keys)
@@ -277,7 +249,7 @@ def test_a_helper_is_not_asked_again_where_it_found_nothing_as_a_member(rule):
     """Who was no member, or was not asked for this time, still helps."""
     helpers = {name: Member(name, -1.0) for name in ("cheap", "other")}
     hard = Member("hard", -1.0, helpers={name: lambda one=one: one for name, one in helpers.items()})
-    cheap = Member("cheap", 0.5, own_way=True)
+    cheap = Member("cheap", 0.5)
     found, _ = asked(cheap, hard, rule=rule)
     assert found.f_ttr == pytest.approx(0.5)
     refused = {t for t in cheap.asked if t > 0.55}
@@ -290,27 +262,11 @@ def test_a_helper_is_not_asked_again_where_it_found_nothing_as_a_member(rule):
 def test_where_feasibility_is_contiguous_a_helper_is_not_asked_after_it_found_nothing(rule):
     helper = Member("cheap", -1.0)
     hard = Member("hard", 1.1, helpers={"cheap": lambda: helper})
-    cheap, better = Member("cheap", 0.5, own_way=True), Member("better", 0.9)
+    cheap, better = Member("cheap", 0.5), Member("better", 0.9)
     found, _ = asked(cheap, better, hard, rule=rule)
     assert found.f_ttr == pytest.approx(1.1)
     assert max(hard.asked) > 1.15
     assert helper.asked == []  # by bisection it was asked at 0.6 s and not later, by a scan everywhere
-
-
-@pytest.mark.parametrize("latest", [0.5, -1.0])
-def test_who_helps_later_is_asked_for_tightened_problems_only_where_it_matters(latest):
-    """Where the others found nothing later, as a helper; and where nobody found anything."""
-    cheap, helper = Member("cheap", 9.0), Member("cheap", 9.0)
-    hard = Member("hard", -1.0, helpers={"cheap": lambda: helper})
-    found, _ = asked(cheap, hard, source=Tightening(), checker=Until(latest))
-    assert found.f_ttr == (pytest.approx(latest) if latest > 0.0 else None)
-    first = 0.6 if latest > 0.0 else 0.0
-    assert helper.asked == [pytest.approx(first)] * 3
-    assert cheap.asked.count(0.0) == (1 if latest > 0.0 else 4)
-    scanned, alone = Member("cheap", 9.0), Member("cheap", 9.0)
-    for member, others, keys in ((scanned, [hard], {"rule": "scan"}), (alone, [], {})):
-        asked(member, *others, source=Tightening(), checker=Until(latest), **keys)
-        assert max(member.asked.count(t) for t in member.asked) == 3
 
 
 def test_no_proof_is_looked_for_where_a_visit_costs_less():

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from repair.backend.base import Capabilities, RepairBackend, SolveResult, SolveS
 from repair.backend.guard import Guarded
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
-from repair.problem.problem import Maneuver, RepairProblem
+from repair.problem.problem import RepairProblem
 from repair.search.probe import Hopeless, ProblemSource
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import CONTIGUOUS
@@ -25,6 +25,8 @@ from repair.situation import Situation
 from repair.timegrid import INSTANT, intervals
 
 __all__ = ["Refusing", "capabilities_of", "search_with"]
+
+_FEW = 2  # times-to-repair that are looked at without asking for a proof first
 
 
 def search_with(
@@ -167,15 +169,12 @@ def _search_with(
 ) -> SearchResult:
     """As :func:`search_with`, without fallbacks."""
 
-    def ask(
-        name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None, brief: bool = False
-    ) -> SearchResult:
-        own = around or (situation.unguided if one.capabilities.own_way else situation.source)
-        own = _AsTheyAre(own) if brief else own
+    def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
+        own = situation.unguided if one.capabilities.own_way else situation.source
         return search_f_ttr(
-            own, situation.conflict, _Unaided(one, name, refused, onward=onward), situation.judge, settings,
-            visits=visits, on_probe=on_probe if several is None else by(name), after=best,
-            hopeless=hopeless if not onward or _slow(one.capabilities, asked) else None,
+            around or own, situation.conflict, _Unaided(one, name, refused, onward=onward), situation.judge,
+            settings, visits=visits, on_probe=on_probe if several is None else by(name), after=best,
+            hopeless=hopeless if not onward or _slow(one.capabilities, refused) else None,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:
@@ -187,24 +186,19 @@ def _search_with(
         return visited
 
     several, probes, refused = backend.capabilities.members, list[Probe](), dict[str, set[float]]()
-    onward, asked = visits is None and settings.rule in CONTIGUOUS, set[str]()
+    onward = visits is None and settings.rule in CONTIGUOUS
     if several is None:
         return ask(name, backend, settings, None)
     begin, complete, best = time.perf_counter(), True, None
     end, late = situation.conflict.time, too_late
-    members = several()
-    # Who is shown the way, and helps a later member, is asked there once more for what is then left, and with
-    # tightened problems only then; or where nobody finds anything.
-    brief = {each for each in members if onward and _helps_later(each, members)}
-    for each in (*members, *(name for name in members if name in brief)):
-        member, earnest = members[each], each in asked or each not in brief
-        if each in asked and best is not None:
-            break
+    for each, member in several().items():
         if best is not None:
             if late is not None and _open(visits, best, settings, end):
                 end, late = min(end, late()), None
             try:  # an interrupt loses nothing that was found
-                slow = not onward or _slow(member.capabilities, asked)
+                slow = not onward or _slow(
+                    member.capabilities, refused, len(_later(visits, best, settings, end))
+                )
                 if slow and hopeless is not None and settings.proofs and _open(visits, best, settings, end):
                     left = _left(settings, begin)
                     end = min(end, _since(hopeless, _later(visits, best, settings, end), left))
@@ -217,10 +211,8 @@ def _search_with(
         limit = _left(settings, begin)
         upper = end if settings.upper is None else min(end, settings.upper)
         now = replace(settings, time_limit=limit, upper=upper if math.isfinite(upper) else None)
-        found = ask(each, member, now, best, brief=not earnest)
-        asked.add(each)
-        if earnest:
-            refused[each] = {probe.t_rep for probe in found.probes if not probe.feasible}
+        found = ask(each, member, now, best)
+        refused[each] = {probe.t_rep for probe in found.probes if not probe.feasible}
         if found.status in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING):
             return found
         best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
@@ -236,50 +228,15 @@ def _search_with(
     )
 
 
-class _AsTheyAre:
-    """Problems that are not tightened where the checker rejects what they give.
+def _slow(can: Capabilities, refused: Collection[str], times: float = math.inf) -> bool:
+    """Whether a search of so many times-to-repair may cost more than a proof that ends it.
 
-    Parameters
-    ----------
-    source : ProblemSource
+    Who finds its own way looks at one or two as fast as a proof, and may find something; others do so where
+    their helpers have all refused.
     """
-
-    notches: tuple[Sequence[float], Sequence[float], Sequence[float]] = ((), (), ())
-
-    def __init__(self, source: ProblemSource) -> None:
-        self._source = source
-
-    def at(self, t_rep: float) -> Sequence[RepairProblem]:
-        """Those of the source."""
-        return self._source.at(t_rep)
-
-    def relaxed(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
-        """Those of the source."""
-        return self._source.relaxed(t_rep)
-
-    def widened(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
-        """Those of the source."""
-        return self._source.widened(t_rep)
-
-    def along(self, manoeuvre: Curve, kind: Maneuver, *, jumps: bool = False) -> RepairProblem:
-        """That of the source."""
-        return self._source.along(manoeuvre, kind, jumps=jumps)
-
-    def without_guide(self, t_rep: float) -> Sequence[RepairProblem]:
-        """Those of the source."""
-        return self._source.without_guide(t_rep)
-
-
-def _helps_later(name: str, members: Mapping[str, RepairBackend]) -> bool:
-    """Whether a member that is shown the way helps one that is asked after it."""
-    later = list(members)[list(members).index(name) + 1 :]
-    helps = any(name in members[each].capabilities.helpers for each in later)
-    return helps and not members[name].capabilities.own_way
-
-
-def _slow(can: Capabilities, asked: Collection[str]) -> bool:
-    """Whether a visit of a backend may cost more than a proof: with helpers only before they were asked."""
-    return can.own_way or (can.relaxes and not can.helpers) or not can.helpers.keys() <= set(asked)
+    if can.own_way:
+        return times > _FEW
+    return (can.relaxes and not can.helpers) or not can.helpers.keys() <= set(refused)
 
 
 def _left(settings: SearchConfig, begin: float) -> float | None:
