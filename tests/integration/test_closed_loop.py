@@ -22,6 +22,7 @@ from repair.scene.commonroad import load_scene
 from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
 from repair.search.rules import around
+from repair.simulate.carried import Carried
 from repair.simulate.eyes import Eyes
 from repair.simulate.many.case import Case, case_at, plan_on, simulation_config
 from repair.simulate.many.task import drive_of, run_drive
@@ -265,6 +266,22 @@ def test_nobody_is_asked_again_where_nothing_was_found_among_the_same(cases):
     again = watch.look(case.curve, traffic=traffic, ego=ego)
     assert watch.answer(again, visits=(0.0,)).curve is None
     assert len(watch._backend.places) == count + len(at_once)
+
+
+def test_what_one_member_refuses_another_may_have_found(cases):
+    case = cases["scenario_1"]
+    start = case.plan.scene.initial_state
+    ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+    watch = case.plan.hard.twin()
+    backend = watch._backend
+    members = {"one": Asked(backend, -1.0), "other": Asked(backend, 0.0)}
+    watch._backend = Asked(backend, -1.0)
+    watch._backend.capabilities = replace(backend.capabilities, members=lambda: members)
+    watch._nothing = Carried(0.0, np.inf, 0.1, False)
+    traffic = Traffic(case.plan.scene.obstacles, case.plan.scene.n_steps)
+    looked = watch.look(case.curve, traffic=traffic, ego=ego)
+    assert watch.answer(looked, visits=(0.0,)).f_ttr == 0.0
+    assert watch.answer(looked, enough=0.2, solves=1).f_ttr == 0.0
 
 
 def test_each_drive_looks_for_itself(cases):

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from repair.deadline import OutOfTime
 from repair.search.rules import around
+from repair.search.settings import SearchConfig
 from repair.simulate.carried import Stint, carried_from
+from repair.simulate.share import Share
 from repair.timegrid import INSTANT
 
 STEP = 0.1
@@ -98,3 +100,13 @@ def test_what_is_kept_meanwhile_does_not_end_a_search_from_above():
     assert carried.seen_from(1.2, 0.6) is None
     found = carried_from([probe(6, False), probe(2, True)], 1.0, 1.2, STEP, (None, 0.8))
     assert found.seen_from(1.0, 0.2) == pytest.approx((0.2, 0.4, 0.6, 1.6))
+
+
+@pytest.mark.parametrize(
+    "deadline, limit, most", [(None, 9.0, 4.0), (7.0, None, 2.0), (7.0, 9.0, 2.0), (7.0, 0.0, 0.001)]
+)
+def test_all_that_a_cycle_searches_has_one_limit(deadline, limit, most):
+    backend = SimpleNamespace(name="any", capabilities=None)
+    share = Share(SimpleNamespace(), backend, SearchConfig(time_limit=limit), 0.0, deadline)
+    share._begin -= 5.0
+    assert 0.0 < share.timely().time_limit <= most

@@ -13,6 +13,7 @@ from tests.contract import problems
 from repair.arrays import frozen
 from repair.backend.base import SolveStatus
 from repair.curves.bspline import UniformBSpline
+from repair.deadline import OutOfTime
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, Maneuver, Side
 from repair.scene.frame import FrenetFrame
 from repair.scene.road.bounds import LateralBounds
@@ -314,6 +315,29 @@ def test_models_are_kept_as_far_as_there_is_room():
     assert kept(large) is kept(large)
     assert kept.cache_info().currsize == 1
     assert build_model.megabytes <= build_model.cache_info().maxsize
+
+
+def test_what_was_not_asked_for_lately_goes_sooner():
+    kept = KeptBySize(lambda key: object(), lambda key: 1.0, 4.0, 2.0, 6)
+    first = [kept(key) for key in range(4)]
+    assert [kept(key) for key in range(4)] == first  # all of them lately
+    for _ in range(6):
+        kept(3)
+    kept(4)
+    assert kept.cache_info().currsize == 2
+    assert kept(3) is first[3]
+
+
+def test_of_what_cannot_be_made_nothing_stays():
+    def make(key):
+        raise OutOfTime("no time")
+
+    kept = KeptBySize(make, lambda key: 1.0, 4.0)
+    for key in range(3):
+        with pytest.raises(OutOfTime):
+            kept(key)
+    assert not kept._asked
+    assert kept.cache_info().misses == 3
 
 
 def test_the_nlp_is_made_when_it_is_first_solved(monkeypatch):

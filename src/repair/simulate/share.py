@@ -84,11 +84,12 @@ class Share:
         return float(np.ceil(enough / step - INSTANT)) * step
 
     def timely(self) -> SearchConfig:
-        """With what is left of the limit."""
-        if self.limit is None:
+        """With what is left of the limit, and of the search's own: what a cycle makes is one search."""
+        limits = [limit for limit in (self.limit, self.settings.time_limit) if limit is not None]
+        if not limits:
             return self.settings
-        left = max(self.limit - (time.perf_counter() - self._begin), 1e-6)
-        return replace(self.settings, time_limit=min(left, self.settings.time_limit or left))
+        left = max(min(limits) - (time.perf_counter() - self._begin), 1e-6)
+        return replace(self.settings, time_limit=left)
 
     def visit(self, *places: float) -> SearchResult:
         """Times-to-repair one after the other [s], until a repair is found."""
@@ -101,7 +102,10 @@ class Share:
     def _refuse(self, made: SearchResult, ended: bool) -> None:
         """Keep in mind where nothing was found; what ran out of time says nothing."""
         known = made.probes if made.complete or ended else made.probes[:-1]
-        self.refused.update(probe.t_rep for probe in known if not probe.feasible)
+        if self.backend.capabilities.members is not None and not made.complete:
+            known = ()  # the next member might have found something
+        found = {probe.t_rep for probe in made.probes if probe.feasible}  # by another one
+        self.refused.update(probe.t_rep for probe in known if probe.t_rep not in found)
 
     def search(
         self,

@@ -66,15 +66,16 @@ class KeptBySize(Generic[Key, Made]):
         self._make, self._size, self._most = make, size, most
         self._idle, self._lately = most if idle is None else idle, lately
         self._kept: OrderedDict[Key, Made] = OrderedDict()
-        self._asked: dict[Key, int] = {}  # the number of the last asking
+        self._asked: dict[Key, int] = {}  # the number of the last asking, of those that are kept
         self._lock = threading.Lock()
         self._hits = self._misses = 0
 
     def __call__(self, key: Key) -> Made:
         """What was made for a key, made now if it is not there."""
         with self._lock:
-            self._asked[key] = self._hits + self._misses
+            asked = self._hits + self._misses
             if key in self._kept:
+                self._asked[key] = asked
                 self._hits += 1
                 self._kept.move_to_end(key)
                 return self._kept[key]
@@ -82,7 +83,7 @@ class KeptBySize(Generic[Key, Made]):
         made = self._make(key)  # two threads may make the same thing; the first one is kept
         with self._lock:
             made = self._kept.setdefault(key, made)
-            self._asked.setdefault(key, self._hits + self._misses)
+            self._asked.setdefault(key, asked)
             while len(self._kept) > 1 and self.megabytes > self._allowed():
                 gone, _ = self._kept.popitem(last=False)
                 del self._asked[gone]
