@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array
 
-__all__ = ["SPAN", "forbidden", "meets_throughout", "pieces"]
+__all__ = ["SPAN", "forbidden", "pieces"]
 
 #: Intervals of headings are looked at in pieces no longer than this [rad].
 SPAN = 0.2
@@ -66,16 +66,6 @@ def pieces(low: float, high: float) -> int:
     return max(1, math.ceil((high - low) / SPAN))
 
 
-def meets_throughout(points: Array, shape: Array, corners: Array, angles: Array) -> npt.NDArray[np.bool_]:
-    """Whether the body meets the shape from every one of the points (P,), at all headings.
-
-    Between two headings 2 d apart it does if one point of the body is in the shape at both (the point moves
-    on an arc, whose chord is in the shape, and the body contains that point shortened), or if one point of
-    the shape is at both in the body shrunk by cos d. Tried are some points of either.
-    """
-    return _Witnesses.of(shape, corners, angles).meet(points)
-
-
 class _Witnesses(NamedTuple):
     """Points of a shape and of a body that may be in the other one at headings (A,), wherever the body is.
 
@@ -116,7 +106,12 @@ class _Witnesses(NamedTuple):
         return cls(inner, turn, shrunk * low + _KEPT, shrunk * high - _KEPT, normals, level)
 
     def meet(self, points: Array) -> npt.NDArray[np.bool_]:
-        """See :func:`meets_throughout`."""
+        """Whether the body meets the shape from every one of the points (P, 2), at all headings.
+
+        Between two headings 2 d apart it does if one point of the body is in the shape at both (the point
+        moves on an arc, whose chord is in the shape, and the body contains that point shortened), or if one
+        point of the shape is at both in the body shrunk by cos d. Tried are some points of either.
+        """
         turn, away = self.turn, self.inner[None] - points[:, None]  # (P, A, Q)
         u = away[:, None, :, 0] * turn[None, :, :1] + away[:, None, :, 1] * turn[None, :, 1:]
         w = away[:, None, :, 1] * turn[None, :, :1] - away[:, None, :, 0] * turn[None, :, 1:]

@@ -237,7 +237,7 @@ class FrenetFrame:
 
     def _project(self, flat: Array, hint: Array | None) -> Array:
         start = self._nearest(flat, hint)
-        s, lateral, along, width = self.settled(flat, start)
+        s, lateral, along, width = self._settled(flat, start)
         # Newton may run away from the nearest sample only along the straight extensions
         strayed = (np.abs(np.clip(s, 0.0, self.length) - start) > 1.0) & (width < 0.5)
         outside = (width <= _DOMAIN) | (np.abs(lateral) > self.max_lateral) | (along > 1e-7) | strayed
@@ -245,7 +245,7 @@ class FrenetFrame:
         found[outside] = np.nan
         return found
 
-    def settled(self, flat: Array, start: Array) -> tuple[Array, Array, Array, Array]:
+    def _settled(self, flat: Array, start: Array) -> tuple[Array, Array, Array, Array]:
         """Newton's method for points (N, 2) from arc lengths (N,) on, wherever that leads.
 
         Returns

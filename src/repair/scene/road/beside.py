@@ -85,7 +85,7 @@ def to_frenet_from(frame: FrenetFrame, points: Array, start: Array) -> Array:
 def _settled(
     frame: FrenetFrame, px: Array, py: Array, start: Array
 ) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """As :meth:`FrenetFrame.settled`, each point no longer than it needs; and which of them came to rest."""
+    """As the frame itself settles points, each no longer than it needs; and which of them came to rest."""
     s, lateral, step = _closer(frame, px, py, _closer(frame, px, py, start)[0])
     close = np.abs(step) <= _CLOSE
     for _ in range(_STEPS):
