@@ -149,6 +149,14 @@ def test_nobody_is_asked_where_a_quick_proof_says_too_late():
     assert max(second.asked) > 1.0
 
 
+@pytest.mark.parametrize("latest, times", [(1.7, [1.9, 1.8]), (1.6, None)])
+def test_one_or_two_times_are_looked_at_without_a_proof(latest, times):
+    proof, second = TooLate(1.85), Member("second", -1.0, own_way=True)
+    asked(Member("first", latest), second, hopeless=proof)
+    assert proof.asked == ([] if times else pytest.approx([1.7, 1.8, 1.9]))
+    assert times is None or second.asked == pytest.approx(times)
+
+
 def test_given_visits_that_are_proven_too_late_are_left_out():
     proof, second = TooLate(0.9), Member("second", 1.1, own_way=True)
     asked(Member("first", 0.4), second, hopeless=proof, visits=(0.2, 0.4, 0.6, 1.0))
