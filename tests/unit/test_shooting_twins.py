@@ -10,8 +10,8 @@ from tests import toy
 from tests.unit.test_shooting import STEPS, VEHICLE, among, bend, car_of, standing
 
 from repair.scene.frame import FrenetFrame
-from repair.solvers.shooting.motion import Driven, Tail, direction, drive_along, drive_freely
-from repair.solvers.shooting.plans import ALONG, FREE
+from repair.solvers.shooting.motion import Driven, direction, drive_freely
+from repair.solvers.shooting.plans import FREE
 from repair.solvers.shooting.shots import far
 from repair.solvers.shooting.space import Space, depths, looks
 from repair.world.tracks import as_complex
@@ -42,21 +42,6 @@ def test_the_cheaper_rule_drives_as_runge_and_kutta_do(problem, rows):
     off = [np.abs(a - b)[kept].max(axis=1) for a, b in zip(exact, quick, strict=True)]
     assert max(values.max() for values in off[:5]) < 0.02
     assert max(np.median(values) for values in off[:5]) < 1e-3
-
-
-@pytest.mark.parametrize("steers", [True, False])
-def test_who_drives_on_drives_as_at_once(problem, rows, steers):
-    car, (wanted, turning, tail) = car_of(problem), controls(rows)
-
-    def driven(start, first, last):
-        if not steers:
-            return drive_along(car, start, wanted[:, first:last])
-        rest = Tail(tail.step - first, tail.offset)
-        return drive_freely(car, start, wanted[:, first:last], turning[:, first:last], rest)
-
-    whole, begun = driven(START, 0, 40), driven(START, 0, 13)
-    for a, b in zip(whole, begun.then(driven(begun.last, 13, 40)), strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-12)
 
 
 def test_the_rates_are_those_of_the_places(problem, rows):
@@ -94,34 +79,9 @@ def test_corners_that_come_near_along_the_diagonal_are_seen():
     assert Space(problem, STEPS, 2).excess(driven)[1] == pytest.approx(0.01 + 1e-3, abs=1e-6)
 
 
-def test_the_excess_of_the_parts_is_that_of_the_whole(problem, rows):
-    driven = drive_freely(car_of(problem), START, *controls(rows))
-    first = Driven(*(x[:, : (21 if x.shape[1] == 41 else 20)] for x in driven))
-    second = Driven(*(x[:, 20:] for x in driven))
-    space = Space(problem, STEPS, 2)
-    (total, most), (a, deep), (b, deeper) = (
-        space.excess(driven), space.excess(first), space.excess(second, 20),
-    )  # fmt: skip
-    kept = np.abs(driven.chi).max(axis=1) < 1.2
-    np.testing.assert_allclose((a + b)[kept], total[kept], atol=1e-9)
-    np.testing.assert_allclose(np.maximum(deep, deeper)[kept], most[kept], atol=1e-9)
-
-
 def test_directions_are_cosines_and_sines():
     angles = np.linspace(-3.1, 3.1, 201)
     np.testing.assert_allclose(direction(angles), (np.cos(angles), np.sin(angles)), atol=1e-14)
-
-
-def test_manoeuvres_are_driven_until_nobody_is_left(problem):
-    """A wall right ahead: all have met it within a second, and what comes then is not driven."""
-    from repair.solvers.shooting.settings import ShootingConfig
-    from repair.solvers.shooting.task import Task
-
-    wall = among(toy.problem((), t_end=4.0), problem.shapes.frame, standing(6.0, 0.0, 0.0, half_width=40.0))
-    for plan in (ALONG, FREE):
-        (_, shot), *_ = Task(wall, ShootingConfig()).shots([plan])
-        assert shot.miss > 0.0
-        assert shot.reached <= 16 < 40
 
 
 def test_who_is_too_far_even_at_a_faster_pace_gives_up():

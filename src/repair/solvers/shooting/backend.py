@@ -67,7 +67,7 @@ class ShootingBackend:
                             SolveStatus.SOLVED, task.curve(plan, shot), shot.cost, task.iterations,
                             built - begin, time.perf_counter() - built, residuals={"excess": shot.miss},
                         )  # fmt: skip
-                    if best is None or (-shot.reached, shot.miss) < (-best[1].reached, best[1].miss):
+                    if best is None or shot.miss < best[1].miss:
                         best = plan, shot
                 assert best is not None
                 closest = task.closest(*best)

@@ -112,7 +112,7 @@ class Impacts(Space):
 
     adds_up: ClassVar[bool] = False
 
-    def excess(self, driven: Driven, begun: int = 0) -> tuple[Array, Array]:
+    def excess(self, driven: Driven) -> tuple[Array, Array]:
         """The speed of the first impact [m/s], twice (N,); 0 for who meets nothing and keeps to the road."""
         problem, shapes, shown = self.problem, self.problem.shapes, len(self._times)
         s, l, chi, beta = looks(driven, self.steps.dt, self.fine, shown)  # noqa: E741

@@ -138,19 +138,6 @@ class Driven(NamedTuple):
         """Some of the trajectories."""
         return Driven(*(column.T[:, rows].T for column in self))
 
-    @property
-    def last(self) -> Array:
-        """s, l, v, chi and beta (5, N) at the end."""
-        return np.array([column[:, -1] for column in self[:5]])
-
-    def then(self, more: Driven) -> Driven:
-        """The trajectories, driven on."""
-        columns = []
-        for begun, column in zip(self, more, strict=True):
-            again = column.shape[1] - more.a.shape[1]  # where it goes on is the end of what has been driven
-            columns.append(np.concatenate((begun.T, column.T[again:])).T)
-        return Driven(*columns)
-
 
 def drive_freely(car: Car, start: Array, wanted: Array, turning: Array, tail: Tail) -> Driven:
     """Drive controls as far as the limits allow: first the acceleration, then what is left for the steering.

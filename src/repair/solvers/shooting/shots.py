@@ -25,18 +25,15 @@ class Shot:
     row : (1, D) array
     cost, miss : float
         What was minimised, and by how much an obstacle or the road's edge is missed at most [m].
-    reached : int
-        Over how many steps.
     """
 
     row: Array
     cost: float
     miss: float
-    reached: int = 0
 
 
 class Looked(NamedTuple):
-    """Trajectories as far as they were driven: what is minimised, the deepest place, what they ask (N,)."""
+    """Trajectories that were driven: what is minimised, the deepest place, what they ask (N,)."""
 
     cost: Array
     deep: Array

@@ -80,20 +80,17 @@ class Space:
             room[rows[depth > 0.0]] = self.spare
         return room
 
-    def excess(self, driven: Driven, begun: int = 0) -> tuple[Array, Array]:
+    def excess(self, driven: Driven) -> tuple[Array, Array]:
         """How far into obstacles and beyond the road, in metres times looks, and at most in metres (N,).
 
         Parameters
         ----------
         driven : Driven
-        begun : int
-            Steps that were driven before it.
         """
         # (P, N): what is compared with an obstacle at a look lies together.
-        first = begun * self.fine
-        shown = len(self._times) - first
+        shown = len(self._times)
         s, l, chi, beta = (x.T for x in looks(driven, self.steps.dt, self.fine, shown))  # noqa: E741
-        now = slice(first, first + len(s))
+        now = slice(0, len(s))
         turned = chi - beta
         cos, sin = direction(turned)
         if self.problem.shapes is None:

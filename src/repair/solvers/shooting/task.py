@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from enum import Enum
-from functools import reduce
 
 import numpy as np
 
@@ -16,12 +15,12 @@ from repair.curves.base import Curve
 from repair.deadline import in_time
 from repair.problem.problem import RepairProblem
 from repair.solvers.shooting.curve import curve_along, curve_of
-from repair.solvers.shooting.motion import Car, Driven, Tail, drive_along, drive_freely
+from repair.solvers.shooting.motion import Car, Driven, drive_along, drive_freely
 from repair.solvers.shooting.plans import Plan, Steps, first_along, first_freely
 from repair.solvers.shooting.settings import ShootingConfig
 from repair.solvers.shooting.shots import First, Looked, Shot, apart, effort_of, far
 from repair.solvers.shooting.space import Space
-from repair.timegrid import SHORT, steps_until
+from repair.timegrid import SHORT
 from repair.vehicle.parameters import Vehicle, load_vehicle
 from repair.vehicle.single_track import body_angles
 
@@ -36,7 +35,6 @@ _HISTORY = 120  # samples of the reference before t_rep, after which the body's 
 _MORE = 0.01  # and more of it, where that is too little
 _LITTLE = 0.01  # what counts as a miss and is none of a distance [m]
 _PROGRESS = 0.02  # share of what is left by which an iteration has to be better than those before it
-_STAGES = (0.4, 0.8, 1.6)  # [s] since t_rep: where all have met something by one, they drive to the next
 _INCH = 1e-3  # by which more is kept from obstacles where what is driven exactly meets one [m]
 _EDGE = 0.05  # by which the lateral room is narrowed where a trajectory in it leaves the road [m]
 
@@ -91,24 +89,13 @@ class Task:
 
     def drive(self, plan: Plan, rows: Array, car: Car) -> Driven:
         """The trajectories (N,) of controls (N, D)."""
-        (driven,) = self._driven(plan, rows, car, [self.steps.count])
-        return driven
-
-    def _driven(self, plan: Plan, rows: Array, car: Car, ends: Sequence[int]) -> Iterator[Driven]:
-        """The same, in parts that end at steps."""
         limits, begun = self.problem.limits, float(self.problem.start[2, 0])
         wanted = plan.accelerations(rows, self.steps, begun, limits.a_min, limits.a_max)
-        if plan.steers:
-            turning, tail = plan.steering(rows, self.steps), plan.tail(rows, self.steps)
-        begin, start = 0, self.start
-        for end in ends:
-            if plan.steers:
-                rest = Tail(tail.step - begin, tail.offset)
-                driven = drive_freely(car, start, wanted[:, begin:end], turning[:, begin:end], rest)
-            else:
-                driven = drive_along(car, start, wanted[:, begin:end])
-            yield driven
-            begin, start = end, driven.last
+        if not plan.steers:
+            return drive_along(car, self.start, wanted)
+        return drive_freely(
+            car, self.start, wanted, plan.steering(rows, self.steps), plan.tail(rows, self.steps)
+        )
 
     def curve(self, plan: Plan, shot: Shot) -> Curve:
         """The curve of the best trajectory."""
@@ -181,17 +168,12 @@ class Task:
             if found.miss <= 0.0:
                 return found
             now = np.array((found.miss, looked.cost.min()))
-            if found.reached > best.reached:
-                best, least, idle = found, [now], 0
-            else:
-                if found.reached < best.reached:
-                    now[:] = np.inf
-                elif found.miss < best.miss:
-                    best = found
-                idle = 0 if (now < (1.0 - _PROGRESS) * least[-1]).any() else idle + 1
-                least.append(np.minimum(least[-1], now))
-                if idle == patience or (avoids and far(least, left)):
-                    break
+            if found.miss < best.miss:
+                best = found
+            idle = 0 if (now < (1.0 - _PROGRESS) * least[-1]).any() else idle + 1
+            least.append(np.minimum(least[-1], now))
+            if idle == patience or (avoids and far(least, left)):
+                break
             means, spreads = self._next(means, spreads, draws, looked.cost)
         return best
 
@@ -208,29 +190,11 @@ class Task:
         return means[good], spreads[good]
 
     def _look(self, plan: Plan, rows: Array) -> Looked:
-        """The trajectories (N,), until all have met something, and as long again.
-
-        What comes then saves nobody, and hardly says who of them comes closest to getting through.
-        """
+        """The trajectories (N,), and what there is to say of them."""
         self.iterations += 1
-        ends = [self.steps.count]
-        if self.coarse.adds_up:
-            stages = (steps_until(t, self.steps.dt) for t in _STAGES)
-            ends = [*(k for k in stages if 0 < k < ends[0]), *ends]
-        total, most, fast = np.zeros((3, len(rows)))
-        begun, enough = 0, False
-        parts: list[Driven] = []
-        for part in self._driven(plan, rows, self.car, ends):
-            added, deepest = self.coarse.excess(part, begun)
-            total, most = total + added, np.maximum(most, deepest)
-            if not plan.steers:
-                fast = np.maximum(fast, self.coarse.overload(part))
-            parts.append(part)
-            begun = ends[len(parts) - 1]
-            if enough:
-                break
-            enough = bool(np.maximum(most, fast).all())
-        driven = reduce(Driven.then, parts)
+        driven = self.drive(plan, rows, self.car)
+        total, most = self.coarse.excess(driven)
+        fast = np.zeros(len(rows)) if plan.steers else self.coarse.overload(driven)
         effort = effort_of(driven)
         cost = total + _DEEPEST * most + fast + _EFFORT * effort
         return Looked(cost, np.maximum(most, fast), effort, driven)
@@ -245,8 +209,7 @@ class Task:
             clear = clear[effort[clear].argsort(kind="stable")]
             most[clear] = self._from_near(plan, rows[few[clear]], looked.driven.take(few[clear]))
         k = int(np.lexsort((effort, most))[0])
-        reached = looked.driven.a.shape[1]
-        return Shot(rows[few[k : k + 1]], float(looked.cost[few[k]]), float(most[k]), reached)
+        return Shot(rows[few[k : k + 1]], float(looked.cost[few[k]]), float(most[k]))
 
     def _from_near(self, plan: Plan, rows: Array, driven: Driven) -> Array:
         """What keeps trajectories (N,) that seem clear from being found, as metres: until one is found.
