@@ -82,8 +82,9 @@ def test_boxes_are_those_of_the_whole_as_long_as_somebody_asks(scene):
     asked = whole.t <= prepared.t_end + 0.2
     assert asked.sum() < len(asked) - 5  # else nothing is left out
     known = np.isfinite(made.lower).all(axis=-1)
-    np.testing.assert_array_equal(made.lower[known], whole.lower[known])
-    np.testing.assert_array_equal(made.upper[known], whole.upper[known])
+    for some, all_of_them in ((made.lower, whole.lower), (made.upper, whole.upper)):
+        # Outlines are projected in blocks, and sums over blocks of another length are rounded differently.
+        np.testing.assert_allclose(some[known], all_of_them[known], rtol=0.0, atol=1e-12)
     assert known[:, asked][:, -1].all()
     assert not known[:, -1].any()
 
