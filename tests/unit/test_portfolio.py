@@ -149,6 +149,16 @@ def test_nobody_is_asked_where_a_quick_proof_says_too_late():
     assert max(second.asked) > 1.0
 
 
+def test_a_helper_that_found_nothing_at_all_is_asked_at_later_times():
+    """Bisection ends at its first visit where that is not feasible, which says nothing of the others."""
+    helper = Member("cheap", -1.0)
+    hard = Member("hard", 1.1, helpers={"cheap": lambda: helper})
+    found, _ = asked(Member("cheap", -1.0, own_way=True), hard)
+    assert found.f_ttr == pytest.approx(1.1)
+    assert helper.asked
+    assert 0.0 not in helper.asked
+
+
 @pytest.mark.parametrize("latest, times", [(1.7, [1.9, 1.8]), (1.6, None)])
 def test_one_or_two_times_are_looked_at_without_a_proof(latest, times):
     proof, second = TooLate(1.85), Member("second", -1.0, own_way=True)

@@ -83,8 +83,8 @@ def search_with(
         left = None if settings.time_limit is None else max(settings.time_limit - found.wall_time, 0.0)
         again = search_f_ttr(
             around or (situation.unguided if other.capabilities.own_way else situation.source),
-            situation.conflict, _Unaided(other, each, refused, onward=settings.rule in CONTIGUOUS),
-            situation.judge, replace(settings, time_limit=left), hopeless=hopeless,
+            situation.conflict, _Unaided(other, each, refused), situation.judge,
+            replace(settings, time_limit=left), hopeless=hopeless,
             on_probe=None if on_probe is None else partial(_told, on_probe, each),
         )  # fmt: skip
         refused[each] = {probe.t_rep for probe in again.probes}
@@ -108,11 +108,16 @@ class _Unaided(Guarded):
         At which t_rep [s] a backend found nothing, by its name.
     onward : bool
         Whoever found nothing at a t_rep is taken to find nothing at later ones, as a rule does that takes
-        feasibility to be contiguous.
+        feasibility to be contiguous; it does so after a t_rep at which something was found.
     """
 
     def __init__(
-        self, backend: RepairBackend, name: str, refused: Mapping[str, Collection[float]], *, onward: bool
+        self,
+        backend: RepairBackend,
+        name: str,
+        refused: Mapping[str, Collection[float]],
+        *,
+        onward: bool = False,
     ) -> None:
         super().__init__(backend, name)
         helpers = dict(backend.capabilities.helpers)
@@ -171,10 +176,11 @@ def _search_with(
 
     def ask(name: str, one: RepairBackend, settings: SearchConfig, best: Probe | None) -> SearchResult:
         own = situation.unguided if one.capabilities.own_way else situation.source
+        after = onward and best is not None
         return search_f_ttr(
-            around or own, situation.conflict, _Unaided(one, name, refused, onward=onward), situation.judge,
+            around or own, situation.conflict, _Unaided(one, name, refused, onward=after), situation.judge,
             settings, visits=visits, on_probe=on_probe if several is None else by(name), after=best,
-            hopeless=hopeless if not onward or _slow(one.capabilities, refused) else None,
+            hopeless=hopeless if not after or _slow(one.capabilities, refused) else None,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:
