@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array, Points, wrap
 from repair.world.advance import Left, Motion, circle_left, polygons_left, rectangle_left
@@ -142,7 +143,9 @@ class TrackTable:
         return ego, (ego + start) * len(self.kind) + track
 
     def intervals(self, ego: Index, row: Index, since: int, last: int) -> Iterator[tuple[int, int, int]]:
-        """Pairs of a sample and a shape as the two intervals beside it, and as the instant that it is.
+        """Pairs of a sample and a shape as the two intervals beside it, or as the instant that it is.
+
+        An instant is there where no interval that ends there, or begins, holds the shape at it.
 
         Parameters
         ----------
@@ -155,14 +158,29 @@ class TrackTable:
         (first, after, track)
             The interval's samples, the same one twice for an instant; each once, in the order of time.
         """
+        track = row % len(self.kind)
         at: dict[int, set[int]] = {}
-        for k, m in zip(ego.tolist(), (row % len(self.kind)).tolist(), strict=True):
+        for k, m in zip(ego.tolist(), track.tolist(), strict=True):
             at.setdefault(k, set()).add(m)
+        alone: dict[int, set[int]] = {}
+        only = ~self._held(ego, row, self.mode[track], since, last)
+        for k, m in zip(ego[only].tolist(), track[only].tolist(), strict=True):
+            alone.setdefault(k, set()).add(m)
         for first in sorted({j for k in at for j in (k - 1, k)}):
             here, following = at.get(first, _NOBODY), at.get(first + 1, _NOBODY)
-            yield from ((first, first, m) for m in sorted(here))
+            if first in alone:
+                yield from ((first, first, m) for m in sorted(alone[first]))
             if since <= first < last:
                 yield from ((first, first + 1, m) for m in sorted(here | following) if not self._instant[m])
+
+    def _held(self, ego: Index, row: Index, mode: Index, since: int, last: int) -> npt.NDArray[np.bool_]:
+        """Whether an interval that ends at a sample, or begins there, holds the shape of that sample."""
+        count, most = len(self.kind), len(self.heading) - 1
+        ends, begins = ego > since, ego < last
+        held = (begins & (mode == BEFORE)) | (ends & (mode == AFTER))
+        begins &= ~np.isnan(self.heading.take(np.minimum(row + count, most)))
+        ends &= ~np.isnan(self.heading.take(np.maximum(row - count, 0)))
+        return held | ((mode == MOVING) & (begins | ends))
 
     def motion(
         self, first: int, after: int, track: int, start: int, unit: float, here: Points, orientation: Array,
