@@ -211,7 +211,7 @@ class Sight:
         looked = self.eyes.timed(look)
         if looked.conflict.time == float("inf"):
             return None
-        return self._search(watch, looked, None)
+        return self._search(watch, looked, None, brief=True)
 
     def sure(self) -> bool:
         """Whether the contact is there with everybody ahead of what is believed, and with everybody behind.
@@ -246,13 +246,14 @@ class Sight:
         watch: Watch,
         looked: Looked | None,
         visits: tuple[float, ...] | None,
+        brief: bool = False,
     ) -> Found:
         assert looked is not None
         config = self.eyes.grounds.config.simulate
         left = None if config.solves is None else max(config.solves - self.eyes.solves, 1)
         found = self.eyes.timed(
             lambda: watch.answer(
-                looked, limit=config.deadline, visits=visits, enough=self.period, solves=left
+                looked, limit=config.deadline, visits=visits, enough=self.period, solves=left, brief=brief
             )
         )
         self.eyes.complete &= found.complete

@@ -146,11 +146,12 @@ class Share:
             probes = probes[:-1]  # nobody knows what would have come of the one that ran out of time
         return carried_from(probes, self.now, self.end, self.settings.delta_t, before)
 
-    def to_wait_on(self, made: SearchResult, enough: float) -> SearchResult:
+    def to_wait_on(self, made: SearchResult, enough: float, *, brief: bool = False) -> SearchResult:
         """After a search that was ended and has found nothing: a repair that can be waited for.
 
         It is looked for at the first place of the grid that is so late [s], and where there is none the
-        search goes on until there is one, or to its end.
+        search goes on until there is one, or to its end. ``brief``: only one that begins at once is
+        looked for then.
         """
         at = self.first_to_wait(enough)
         rest = None if self.carried is None else self.carried.seen_from(self.now, None)
@@ -159,6 +160,9 @@ class Share:
         self.complete = self.carried is None
         if made.curve is not None or rest is None:
             return made
+        if brief:
+            self.carried, self.complete = None, True
+            return made if 0.0 in self.refused else self.visit(0.0)
         return self.search(rest, 0, enough, needed=True)
 
     def anew(self, made: SearchResult, least: float, enough: float, solves: int | None) -> SearchResult:

@@ -148,6 +148,7 @@ class Watch(Repairer):
         visits: tuple[float, ...] | None = None,
         enough: float | None = None,
         solves: int | None = None,
+        brief: bool = False,
     ) -> Found:
         """The search among what was looked at.
 
@@ -166,6 +167,8 @@ class Watch(Repairer):
             waited for: where none was found, it is looked for there, and then the search goes to its end.
             Where nothing to wait on comes of one that was carried on, it is made anew. After a cycle that
             has found nothing at all, the next ones make theirs in several cycles.
+        brief : bool
+            Where there is none to wait for after so many solves, only one that begins at once is looked for.
         """
         prepared = looked.prepared
         share = Share(prepared, self._backend, self.config.search, looked.now, limit, looked.refused)
@@ -186,7 +189,7 @@ class Watch(Repairer):
         again = nothing is not None and looked.now - nothing.now <= latest and looked.conflict.time < np.inf
         if goes_round and kept is None and nothing is not None and again:
             return self._once_more(share, nothing, enough, solves or 0)
-        made = self._searched(share, on, kept, last, enough, solves)
+        made = self._searched(share, on, kept, last, enough, solves, brief)
         self._carried = share.carried
         later = made.f_ttr is not None and made.f_ttr > until
         if made.curve is not None and made.f_ttr is not None and later:
@@ -203,7 +206,7 @@ class Watch(Repairer):
     @staticmethod
     def _searched(
         share: Share, on: Start | None, kept: tuple[float, Curve] | None, last: KeptRepair | None,
-        enough: float, solves: int | None,
+        enough: float, solves: int | None, brief: bool,
     ) -> SearchResult:  # fmt: skip
         """Where the last cycle ended, or from what is kept, or was, on; then for what has to be there."""
         until = -np.inf if kept is None else kept[0]
@@ -213,7 +216,7 @@ class Watch(Repairer):
             start = None if kept is None else until, due if due >= 0.0 else None, None, None
         made = share.search(start, solves, enough, best=start[0])
         if share.ended and made.f_ttr is None and start[0] is None and until < enough - INSTANT:
-            made = share.to_wait_on(made, enough)
+            made = share.to_wait_on(made, enough, brief=brief)
         least = until if made.f_ttr is None else max(until, made.f_ttr)
         if on is not None and share.contiguous and share.complete and least < enough - INSTANT:
             made = share.anew(made, least, enough, solves)

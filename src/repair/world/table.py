@@ -177,10 +177,11 @@ class TrackTable:
         """Whether an interval that ends at a sample, or begins there, holds the shape of that sample."""
         count, most = len(self.kind), len(self.heading) - 1
         ends, begins = ego > since, ego < last
-        held = (begins & (mode == BEFORE)) | (ends & (mode == AFTER))
+        held: npt.NDArray[np.bool_] = (begins & (mode == BEFORE)) | (ends & (mode == AFTER))
         begins &= ~np.isnan(self.heading.take(np.minimum(row + count, most)))
         ends &= ~np.isnan(self.heading.take(np.maximum(row - count, 0)))
-        return held | ((mode == MOVING) & (begins | ends))
+        held |= (mode == MOVING) & (begins | ends)
+        return held
 
     def motion(
         self, first: int, after: int, track: int, start: int, unit: float, here: Points, orientation: Array,

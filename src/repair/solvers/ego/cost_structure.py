@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations_with_replacement
+from itertools import chain, combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,30 +103,73 @@ def cost_structure(
         Of the band: how far apart the coordinates are that one term of the cost couples.
     sizes : Sizes
     """
-    stack = np.vstack([derivative_matrix(n, k, spacing) for k in _ORDERS])
-    size = (last - first) * axes
-    where, factor = np.zeros((len(stack), axes, 10), dtype=np.intp), np.zeros((len(stack), axes, 10))
-    begin = 0
-    for k in _ORDERS:
-        i = np.arange(n - k)
-        stencil, rows = stack[begin, : k + 1], slice(begin, begin + n - k)
-        for slot, (low, high) in enumerate(combinations_with_replacement(range(k + 1), 2)):
-            both = ((first <= i + low) & (i + high < last))[:, None]  # points are free
-            column = (i[:, None] + low - first) * axes + np.arange(axes)
-            where[rows, :, slot] = np.where(both, column * (width + 1) + (high - low) * axes, 0)
-            factor[rows, :, slot] = np.where(both, stencil[low] * stencil[high], 0.0)
-        begin += n - k
+    layout = _layout(n, axes, first, last, width, sizes)
+    stencils = [derivative_matrix(k + 1, k, spacing)[0] for k in _ORDERS]
+    values = np.concatenate(([0.0], *stencils))
+    stack = frozen(values.take(layout.stack))
+    products = [
+        [one[low] * one[high] for low, high in _pairs(k)] for k, one in zip(_ORDERS, stencils, strict=True)
+    ]
+    factors = frozen(np.array([0.0, *chain.from_iterable(products)]).take(layout.factor))
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
-    factors = frozen(factor.reshape(-1, 10))
-    band = np.bincount(where.ravel(), (factors * smooth[:, None]).ravel(), size * (width + 1))
-    entries, dense = where.reshape(-1, 10), None
-    entries.setflags(write=False)
-    if 2 * len(stack) * size * axes <= sizes.dense:
-        x = np.kron(stack[:, first:last], np.eye(axes))
+    size = (last - first) * axes * (width + 1)
+    band = np.bincount(layout.where.ravel(), (factors * smooth[:, None]).ravel(), size)
+    dense = None
+    if layout.dense is not None:
+        x = values.take(layout.dense)
         dense = frozen(np.concatenate((x, -x)))
-    maps = (frozen(stack), frozen(stack[:, first:last]), frozen(stack[:, first:last].T))
+    maps = (stack, frozen(stack[:, first:last]), frozen(stack[:, first:last].T))
     if n > sizes.sparse:
         from scipy.sparse import csr_array
 
         maps = tuple(csr_array(m) for m in maps)
-    return CostStructure(*maps, frozen(smooth), width, frozen(band), factors, entries, dense)
+    return CostStructure(*maps, frozen(smooth), width, frozen(band), factors, layout.where, dense)
+
+
+class _Layout(NamedTuple):
+    """Which value stands where, whatever the spacing: 0 is none.
+
+    Attributes
+    ----------
+    stack : (3n - 6, n) int array
+        Of the stencils of V, A and J, one after the other.
+    factor, where : ((3n - 6) axes, 10) int array
+        Of their products by pairs, likewise, and the entry of the band to which they are added.
+    dense : ((3n - 6) axes, m axes) int array or None
+        Of the stencils, for all axes.
+    """
+
+    stack: npt.NDArray[np.intp]
+    factor: npt.NDArray[np.intp]
+    where: npt.NDArray[np.intp]
+    dense: npt.NDArray[np.intp] | None
+
+
+def _pairs(order: int) -> Iterator[tuple[int, int]]:
+    return combinations_with_replacement(range(order + 1), 2)
+
+
+@lru_cache(maxsize=64)
+def _layout(n: int, axes: int, first: int, last: int, width: int, sizes: Sizes) -> _Layout:
+    count, size = 3 * n - 6, (last - first) * axes
+    stack = np.zeros((count, n), dtype=np.intp)
+    where, factor = np.zeros((2, count, axes, 10), dtype=np.intp)
+    begin, value, product = 0, 1, 1
+    for k in _ORDERS:
+        i, rows = np.arange(n - k), slice(begin, begin + n - k)
+        for j in range(k + 1):
+            stack[begin + i, i + j] = value + j
+        for slot, (low, high) in enumerate(_pairs(k)):
+            both = ((first <= i + low) & (i + high < last))[:, None]  # points are free
+            column = (i[:, None] + low - first) * axes + np.arange(axes)
+            where[rows, :, slot] = np.where(both, column * (width + 1) + (high - low) * axes, 0)
+            factor[rows, :, slot] = np.where(both, product + slot, 0)
+        begin, value, product = begin + n - k, value + k + 1, product + (k + 1) * (k + 2) // 2
+    dense = None
+    if 2 * count * size * axes <= sizes.dense:
+        dense = np.kron(stack[:, first:last], np.eye(axes, dtype=np.intp))
+    made = _Layout(stack, factor.reshape(-1, 10), where.reshape(-1, 10), dense)
+    for indices in made:
+        if indices is not None:
+            indices.setflags(write=False)
+    return made
