@@ -74,5 +74,9 @@ def in_seconds(value: float | None) -> str:
 
 def column(values: Any, digits: int = 9) -> list[float | None]:
     """Finite plain floats, None for each that is not."""
-    plain = np.asarray(values, dtype=np.float64).tolist()
-    return [round(v, digits) + 0.0 if math.isfinite(v) else None for v in plain]
+    array = np.asarray(values, dtype=np.float64)
+    # Whole numbers so small are exact, and divided they are what is nearest to the decimal.
+    if array.size and np.abs(array).max() < 2.0**50 / 10.0**digits:
+        plain: list[float | None] = (np.round(array, digits) + 0.0).tolist()
+        return plain
+    return [round(v, digits) + 0.0 if math.isfinite(v) else None for v in array.tolist()]

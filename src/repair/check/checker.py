@@ -122,7 +122,7 @@ class Checker:
         Judged from one step before ``t_rep`` on: until the conflict, the reference has been checked. Where
         the vehicle stands there, from the last step on at which it does not.
         """
-        first, after, path, s, slip0 = self._spliced(problem, curve)
+        first, after, path, s, slip0 = self._spliced(problem.reference, problem.t_rep, problem.t_end, curve)
         if not is_finite(path):
             return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
         slip, orientation = self.scene.model.angles(path, slip0)
@@ -145,12 +145,25 @@ class Checker:
 
     def refuses_traffic(self, problem: RepairProblem, curve: Curve) -> Violation | None:
         """What :meth:`check` would say of the traffic alone; a curve that is not finite meets nobody."""
-        first, _, path, _, slip0 = self._spliced(problem, curve)
+        first, _, path, _, slip0 = self._spliced(problem.reference, problem.t_rep, problem.t_end, curve)
         if not is_finite(path):
             return None
         _, orientation = self.scene.model.angles(path, slip0)
         centre = path.xy.view(np.complex128)[:, 0]
         return self._met(centre, orientation, first, path.longest, problem.t_rep)[0]
+
+    def is_free(self, reference: Curve, curve: Curve, t_end: float, *, road: bool) -> bool:
+        """Whether a curve after the reference touches nobody, nor leaves the road where that is asked.
+
+        The true rectangles, without a margin; the reference is free until the curve begins.
+        """
+        first, after, path, s, slip0 = self._spliced(reference, curve.t_start, t_end, curve)
+        _, orientation = self.scene.model.angles(path, slip0)
+        centre = path.xy.view(np.complex128)[:, 0]
+        if self.world.contact_along(centre, orientation, first, path.longest) is not None:
+            return False
+        late = slice(len(path.t) - len(after), None)
+        return not road or self._off_road(s[late], centre[late], orientation[late]) is None
 
     def _over_a_gap(self, problem: RepairProblem, path: CartesianPath, orientation: Array) -> list[Violation]:
         """A gap of the map that is no road for CommonRoad's own check, where the reference crosses none."""
@@ -228,21 +241,21 @@ class Checker:
         return kept
 
     def _spliced(
-        self, problem: RepairProblem, curve: Curve
+        self, reference: Curve, t_rep: float, t_end: float, curve: Curve
     ) -> tuple[int, FrenetTrajectory, CartesianPath, Array, float | None]:
         """The reference from dense sample ``first`` on, then the curve's samples ``after`` it.
 
         Also the path of both, the arc lengths, and the slip angle to begin with; at the start there is no
         history and no slip angle (None).
         """
-        n, step = self.config.substeps, steps_until(problem.t_rep, self.scene.dt) - 1
-        first = self._kept(problem.reference, problem.t_end).moving(step, n) if step > 0 else 0
-        times = self.times(problem.t_end)
-        after = curve.sample(times[times.searchsorted(problem.t_rep - INSTANT) :])
+        n, step = self.config.substeps, steps_until(t_rep, self.scene.dt) - 1
+        first = self._kept(reference, t_end).moving(step, n) if step > 0 else 0
+        times = self.times(t_end)
+        after = curve.sample(times[times.searchsorted(t_rep - INSTANT) :])
         late, slip0 = len(times) - len(after), None
         motion = motion_of(after, len(times) - first)
         if late:
-            kept = self._kept(problem.reference, problem.t_end)
+            kept = self._kept(reference, t_end)
             motion[:, : late - first] = kept.motion[:, first:late]
             slip0 = None if first == 0 else float(kept.slip[first])
         path = self.scene.frame.carry(times[first:], motion)

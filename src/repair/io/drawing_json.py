@@ -129,7 +129,11 @@ def _require_whole(drawing: Drawing) -> None:
 
 
 def _rows(values: Array) -> list[list[float | None]]:
-    return [column(row) for row in np.atleast_2d(values)] if len(values) else []
+    if not len(values):
+        return []
+    table = np.atleast_2d(values)
+    flat, width = column(table.ravel()), table.shape[1]
+    return [flat[k : k + width] for k in range(0, len(flat), width)]
 
 
 def _array(values: Any, width: int | None = None) -> Array:

@@ -206,17 +206,24 @@ def body_of(
     window : pair of (2,) arrays, or None
         Lowest and highest x and y [m]: None is returned for who never comes into it.
     """
-    shown = {step: rounded(outline) for step in steps if (outline := _outline(obstacle, step)) is not None}
-    middles = np.full((end + 1, 2), np.nan)
-    for step in range(end + 1):
-        outline = _outline(obstacle, step)
-        if outline is not None:
-            middles[step] = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+    middles = _middles(obstacle, end)
     there = middles[np.isfinite(middles).all(axis=1)]
     if window is not None and not ((window[0] < there) & (there < window[1])).all(axis=1).any():
         return None
+    shown = {step: rounded(outline) for step in steps if (outline := _outline(obstacle, step)) is not None}
     moves = len(there) > 1 and np.ptp(there, axis=0).max() >= _STAYS
     return Body(obstacle.id, obstacle.role, rounded(middles if moves else middles[:1]), shown)
+
+
+def _middles(obstacle: Obstacle, end: int) -> Array:
+    """Middles (end + 1, 2) of what is known of its outlines; NaN where it is absent."""
+    outlines = obstacle.vertices[: end + 1]
+    known = np.isfinite(outlines).all(axis=2, keepdims=True)
+    low, high = (np.where(known, outlines, far) for far in (np.inf, -np.inf))
+    middles = np.full((end + 1, 2), np.nan)
+    there = known[..., 0].any(axis=1)
+    middles[: len(outlines)][there] = 0.5 * (low[there].min(axis=1) + high[there].max(axis=1))
+    return middles
 
 
 def _unrepaired(prepared: Prepared, found: SearchResult, moment: int) -> Array | None:

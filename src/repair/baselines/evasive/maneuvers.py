@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from repair.curves.base import Curve, FrenetTrajectory
 if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
-__all__ = ["EvasiveCurve", "EvasiveManeuver", "maneuvers_at"]
+__all__ = ["EvasiveCurve", "EvasiveManeuver", "Path", "maneuvers_at", "path_of"]
 
 _ENGINE_STEP = 0.25  # above v_switch the engine's power limit is followed in steps of this length [s]
 
@@ -32,6 +33,25 @@ class EvasiveManeuver(str, Enum):
     KICK_DOWN = "kick_down"
     STEER_LEFT = "steer_left"
     STEER_RIGHT = "steer_right"
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where a reference leads, as l over s.
+
+    Attributes
+    ----------
+    s, l : (M,) array
+        s increasing [m].
+    """
+
+    s: Array
+    l: Array  # noqa: E741 - the name of the coordinate
+
+    @cached_property
+    def slope(self) -> Array:
+        """Of l by s (M,)."""
+        return frozen(np.gradient(self.l, self.s) if len(self.s) > 1 else np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -49,16 +69,15 @@ class EvasiveCurve:
         Time since ``t_start`` [s], s, speed and acceleration at the start of each phase.
     across : (Q, 5) array
         Time since ``t_start``, offset from the path, its rate, acceleration and jerk.
-    path_s, path_l : (M,) array
-        The reference's path, s increasing [m].
+    path : Path
+        That of the reference.
     """
 
     t_start: float
     t_end: float
     along: Array
     across: Array
-    path_s: Array
-    path_l: Array
+    path: Path
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate position and three derivatives."""
@@ -71,11 +90,10 @@ class EvasiveCurve:
         tau = since - t0
         offset = l0 + r0 * tau + 0.5 * b0 * tau**2 + j0 * tau**3 / 6.0
         rate, bend = r0 + b0 * tau + 0.5 * j0 * tau**2, b0 + j0 * tau
-        slope = np.gradient(self.path_l, self.path_s) if len(self.path_s) > 1 else np.zeros(1)
-        tilt = np.interp(s, self.path_s, slope)
+        tilt = np.interp(s, self.path.s, self.path.slope)
         return FrenetTrajectory(
             times,
-            np.column_stack([s, np.interp(s, self.path_s, self.path_l) + offset]),
+            np.column_stack([s, np.interp(s, self.path.s, self.path.l) + offset]),
             np.column_stack([v, tilt * v + rate]),
             np.column_stack([a0, tilt * a0 + bend]),
             np.column_stack([np.zeros_like(s), j0]),
@@ -89,6 +107,7 @@ def maneuvers_at(
     maneuver: EvasiveManeuver,
     settings: EvasiveConfig,
     vehicle: Vehicle,
+    path: Path | None = None,
 ) -> Sequence[EvasiveCurve]:
     """The variants of a manoeuvre: one along the path, or one for each offset.
 
@@ -101,13 +120,15 @@ def maneuvers_at(
     maneuver : EvasiveManeuver
     settings : EvasiveConfig
     vehicle : Vehicle
+    path : Path, optional
+        What :func:`path_of` says of the reference, where somebody knows.
 
     Returns
     -------
     sequence of EvasiveCurve
         Empty where the vehicle cannot steer: a kinematic one that stands.
     """
-    path_s, path_l = _path_of(reference, t_end)
+    path = path_of(reference, t_end) if path is None else path
     state = reference.sample([t_start])
     s, v = float(state.position[0, 0]), max(float(state.velocity[0, 0]), 0.0)
     duration = t_end - t_start
@@ -129,16 +150,14 @@ def maneuvers_at(
             return ()
         offsets = settings.offset_step * np.arange(1, count + 1)
         profiles = [_swerve(sign * float(offset), acceleration, jerk) for offset in offsets]
-    return [
-        EvasiveCurve(t_start, t_end, frozen(along), frozen(across), path_s, path_l) for across in profiles
-    ]
+    return [EvasiveCurve(t_start, t_end, frozen(along), frozen(across), path) for across in profiles]
 
 
-def _path_of(reference: Curve, t_end: float) -> tuple[Array, Array]:
-    """The reference's path as l over s, continued at its last offset."""
+def path_of(reference: Curve, t_end: float) -> Path:
+    """The reference's path until a time [s], continued at its last offset."""
     points = reference.sample(np.linspace(0.0, t_end, max(int(20 * t_end), 2))).position
     s, index = np.unique(np.maximum.accumulate(points[:, 0]), return_index=True)
-    return frozen(s), frozen(points[index, 1])
+    return Path(frozen(s), frozen(points[index, 1]))
 
 
 def _kick_down(

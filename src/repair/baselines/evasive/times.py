@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from repair.baselines.evasive.maneuvers import EvasiveCurve, EvasiveManeuver, maneuvers_at
+from repair.baselines.evasive.maneuvers import EvasiveCurve, EvasiveManeuver, Path, maneuvers_at, path_of
 from repair.baselines.evasive.settings import EvasiveConfig
 from repair.curves.base import SplicedCurve
 from repair.deadline import in_time
@@ -102,6 +102,7 @@ def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
         return _uniform(EvasiveStatus.NO_CONFLICT)
     if situation.conflict.contact_time <= 0.0:
         return _uniform(EvasiveStatus.ALREADY_COLLIDING)
+    path = path_of(situation.reference, situation.t_end)
     latest = max(intervals(ttc, situation.scene.dt) - 1, 0)
     times: dict[EvasiveManeuver, float] = {}
     curves: dict[EvasiveManeuver, EvasiveCurve] = {}
@@ -109,7 +110,7 @@ def evasive_ttr(situation: Situation, settings: EvasiveConfig) -> EvasiveResult:
         times[maneuver] = -float("inf")
         for step in range(latest, -1, -1):
             in_time()
-            curve = _escape(situation, settings, maneuver, step * situation.scene.dt)
+            curve = _escape(situation, settings, maneuver, step * situation.scene.dt, path)
             if curve is not None:
                 times[maneuver], curves[maneuver] = curve.t_start, curve
                 break
@@ -129,7 +130,8 @@ def brakes_free(situation: Situation, settings: EvasiveConfig, t: float) -> bool
     t : float
         [s].
     """
-    return _escape(situation, settings, EvasiveManeuver.BRAKE, t) is not None
+    path = path_of(situation.reference, situation.t_end)
+    return _escape(situation, settings, EvasiveManeuver.BRAKE, t, path) is not None
 
 
 def _uniform(status: EvasiveStatus) -> EvasiveResult:
@@ -138,13 +140,13 @@ def _uniform(status: EvasiveStatus) -> EvasiveResult:
 
 
 def _escape(
-    situation: Situation, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float
+    situation: Situation, settings: EvasiveConfig, maneuver: EvasiveManeuver, t: float, path: Path
 ) -> EvasiveCurve | None:
     """The first variant of a manoeuvre from ``t`` on that is free until the end of the repairs."""
     steering = maneuver in (EvasiveManeuver.STEER_LEFT, EvasiveManeuver.STEER_RIGHT)
     road = steering or situation.conflict.kind == "off_road"
     for curve in maneuvers_at(
-        situation.reference, t, situation.t_end, maneuver, settings, situation.scene.vehicle
+        situation.reference, t, situation.t_end, maneuver, settings, situation.scene.vehicle, path
     ):
         if _is_free(situation, curve, settings.collision, road):
             return curve
@@ -152,19 +154,15 @@ def _escape(
 
 
 def _is_free(situation: Situation, curve: EvasiveCurve, collision: str, road: bool) -> bool:
-    checker = situation.checker
-    driven = SplicedCurve(situation.reference, curve, curve.t_start)
-    if collision == "boxes":
-        times = checker.times(situation.t_end)
-        if (
-            first_entry(situation.occupancy, driven.sample(times[times >= curve.t_start - INSTANT]))
-            is not None
-        ):
-            return False
-    elif checker.contact(driven, situation.t_end) is not None:
+    checker, t_end = situation.checker, situation.t_end
+    if collision != "boxes":
+        return checker.is_free(situation.reference, curve, t_end, road=road)
+    driven, times = SplicedCurve(situation.reference, curve, curve.t_start), checker.times(t_end)
+    after = driven.sample(times[times >= curve.t_start - INSTANT])
+    if first_entry(situation.occupancy, after) is not None:
         return False
     if not road or checker.road is None:
         return True
-    states = checker.drive(driven, situation.t_end)
+    states = checker.drive(driven, t_end)
     late = states.t >= curve.t_start - INSTANT
     return checker.road.first_off_road(states.x[late], states.y[late], states.orientation[late]) is None
