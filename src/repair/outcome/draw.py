@@ -218,7 +218,7 @@ def body_of(
 def _middles(obstacle: Obstacle, end: int) -> Array:
     """Middles (end + 1, 2) of what is known of its outlines; NaN where it is absent."""
     outlines = obstacle.vertices[: end + 1]
-    known = np.isfinite(outlines).all(axis=2, keepdims=True)
+    known = np.asarray(np.isfinite(outlines).all(axis=2))[..., None]
     low, high = (np.where(known, outlines, far) for far in (np.inf, -np.inf))
     middles = np.full((end + 1, 2), np.nan)
     there = known[..., 0].any(axis=1)
