@@ -323,7 +323,7 @@ class Here:
     def give(self, task):
         row, whole = drive_of(task)
         answer = Future()
-        answer.set_result((row | {"worker_peak_memory_mb": 1.0}, whole))
+        answer.set_result((row, whole))
         return answer
 
     def ready(self):

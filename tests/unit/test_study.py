@@ -34,7 +34,7 @@ from repair.study.rows import STUDY_COLUMNS, failed_row, strict, type_of, volati
 from repair.study.run import estimate, run_study
 from repair.study.store import STORE_FILE, Store
 from repair.study.task import Kept, row_of, unpacked
-from repair.study.worker import run_task
+from repair.study.worker import NOW, run_task
 
 CONSTANT = ("constant",)
 
@@ -310,7 +310,7 @@ class Here:
             self.all.seen.append((self.name, task.file))
             answer = Future()
             row = strict(failed_row(task.file, task.backend, "constant", "found", ""))
-            answer.set_result((row | {"worker_peak_memory_mb": self.all.memory}, None))
+            answer.set_result((row | {NOW: self.all.memory}, None))
             return answer
 
         def ready(self):

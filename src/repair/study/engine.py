@@ -19,12 +19,12 @@ from typing import Any, Protocol
 from repair.errors import RepairError
 from repair.study.plan import Task
 from repair.study.rows import failed_row, one_line, strict
-from repair.study.worker import TOO_MUCH_MEMORY, Answer, begin, parts_of_the_program, run_task, started
+from repair.study.worker import NOW, TOO_MUCH_MEMORY, Answer, begin, parts_of_the_program, run_task, started
 
 __all__ = ["Lane", "Lanes", "LocalLanes", "rows_of"]
 
 _GRACE = 2.0  # a process ends itself when a row takes too long; after this much more it is ended [s]
-_MOST = 280.0  # a process that has taken so much makes room for a new one, between two scenarios [MB]
+_MOST = 300.0  # a process that takes so much makes room for a new one, between two scenarios [MB]
 _LOOKS = 0.1  # how often it is looked at the clock [s]
 
 
@@ -34,7 +34,7 @@ Work = Callable[[Task], Answer]
 class Lane(Protocol):
     """One process that can be given tasks, and be replaced.
 
-    Where it has taken ``most`` MB it is replaced before the next scenario.
+    Where it takes ``most`` MB it is replaced before the next scenario.
     """
 
     name: str
@@ -212,9 +212,7 @@ def rows_of(
                 del busy[each.lane.name]
                 answer = _answer(each)
                 # What scenarios leave behind (models, caches, holes in the heap) adds up.
-                if (answer[0]["worker_peak_memory_mb"] or 0.0) > each.lane.most and queues.turns(
-                    each.lane.name
-                ):
+                if answer[0].pop(NOW, 0.0) > each.lane.most and queues.turns(each.lane.name):
                     each.lane.replace()
                 yield each.task, answer
             if not ended:

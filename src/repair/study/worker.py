@@ -19,11 +19,13 @@ from repair.study.plan import Task, package_version
 from repair.study.task import Kept, row_of
 
 __all__ = [
-    "TOO_MUCH_MEMORY", "Answer", "begin", "parts_of_the_program", "peak_memory", "run_task", "started",
+    "NOW", "TOO_MUCH_MEMORY", "Answer", "begin", "parts_of_the_program", "peak_memory", "run_task", "started",
 ]  # fmt: skip
 
 #: A row, and the whole result.
 Answer = tuple[dict[str, Any], bytes | None]
+#: With a row comes what its process takes when it is made [MB]; that is no column.
+NOW = "worker_memory_now_mb"
 #: The exit status of a process that has taken more memory than it may.
 TOO_MUCH_MEMORY = 77
 _LOOKS = 0.1  # how often the watch looks [s]
@@ -128,7 +130,7 @@ def run_task(task: Task, make: Callable[[Task, Kept], Answer] = row_of) -> Answe
             finally:
                 faulthandler.cancel_dump_traceback_later()
                 _watch.memory = float("inf")
-        row["worker_peak_memory_mb"] = round(peak_memory(), 1)
+        row["worker_peak_memory_mb"], row[NOW] = round(peak_memory(), 1), _memory_now()
         return row, whole
 
 
