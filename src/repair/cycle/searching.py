@@ -12,13 +12,11 @@ from repair.api import find
 from repair.backend.base import RepairBackend
 from repair.preparation import Prepared
 from repair.search.result import Probe, SearchResult, SearchStatus
-from repair.search.rules import around
+from repair.search.rules import CONTIGUOUS, around
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT, intervals
 
 __all__ = ["searched"]
-
-_CONTIGUOUS = ("bisect", "guided")  # rules that take feasibility to be so, and may begin anywhere
 
 
 def searched(
@@ -58,7 +56,7 @@ def searched(
     begin = time.perf_counter()
     found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe)
     nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
-    if thorough and nothing and settings.rule in _CONTIGUOUS:
+    if thorough and nothing and settings.rule in CONTIGUOUS:
         return _the_rest(prepared, backend, settings, begin, found)
     return found
 
@@ -75,7 +73,7 @@ def _searched(
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
     end = _end(prepared, settings)
-    if settings.rule not in _CONTIGUOUS:
+    if settings.rule not in CONTIGUOUS:
         guess = None
     if (kept is None and guess is None) or not np.isfinite(end) or end <= 0.0:
         return find(prepared, backend, settings=settings, on_probe=on_probe)
