@@ -102,6 +102,29 @@ def test_what_is_kept_meanwhile_does_not_end_a_search_from_above():
     assert found.seen_from(1.0, 0.2) == pytest.approx((0.2, 0.4, 0.6, 1.6))
 
 
+@pytest.mark.parametrize("brief, places", [(False, [0.2, 0.4, 0.2]), (True, [0.2, 0.0])])
+def test_briefly_only_a_repair_at_once_is_looked_for_where_none_can_be_waited_for(monkeypatch, brief, places):
+    asked, nothing = [], SimpleNamespace(curve=None, probes=(probe(9, False), probe(8, False)))
+    share = Share(
+        SimpleNamespace(), SimpleNamespace(name="any", capabilities=None), SearchConfig(delta_t=STEP), 0.0
+    )
+    share.carried = carried_from(nothing.probes, 0.0, 1.2, STEP)
+
+    def visit(_, *where):
+        asked.extend(where)
+        return nothing
+
+    def search(_, rest, *unused, **keys):
+        asked.extend((rest[1] - 0.2, 0.2))  # from below the last place on
+        return nothing
+
+    monkeypatch.setattr(Share, "visit", visit)
+    monkeypatch.setattr(Share, "search", search)
+    share.to_wait_on(nothing, 0.2, brief=brief)
+    assert asked == pytest.approx(places)
+    assert (share.carried is None) == brief
+
+
 @pytest.mark.parametrize(
     "deadline, limit, most", [(None, 9.0, 4.0), (7.0, None, 2.0), (7.0, 9.0, 2.0), (7.0, 0.0, 0.001)]
 )

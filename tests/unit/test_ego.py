@@ -15,13 +15,13 @@ from tests import toy
 from repair.arrays import frozen
 from repair.backend.base import SolveResult, SolveStatus
 from repair.curves.base import FrenetTrajectory
-from repair.curves.bases import fitted_knots
+from repair.curves.bases import derivative_matrix, fitted_knots
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.problem.problem import Maneuver, Passing, Side
 from repair.solvers.ego.backend import EgoBackend
 from repair.solvers.ego.bounds import bend_speed, slowest_bend
-from repair.solvers.ego.cost_structure import SIZES, Sizes
+from repair.solvers.ego.cost_structure import SIZES, Sizes, cost_structure
 from repair.solvers.ego.minimise import Minimum, minimiser, newton
 from repair.solvers.ego.pairs import anchor_pairs
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
@@ -54,6 +54,25 @@ def passing_by(problem, side):
 def make_problem(side=Side.BEHIND, *, boxes=BOXES, **keys):
     bare = toy.problem(boxes, **keys)
     return replace(bare, passing=passing_by(bare, side))
+
+
+@pytest.mark.parametrize("spacing", [0.1, 0.37])
+@pytest.mark.parametrize("first, last, axes", [(0, 12, 2), (3, 12, 2), (3, 10, 1)])
+def test_what_is_laid_out_once_holds_for_every_spacing(spacing, first, last, axes):
+    n, width, weight = 12, 3 * axes, 1.7
+    made = cost_structure(n, axes, first, last, spacing, weight, width)
+    orders = [derivative_matrix(n, k, spacing) for k in (1, 2, 3)]
+    assert np.array_equal(made.stack, np.vstack(orders))
+    free = np.kron(np.vstack(orders)[:, first:last], np.eye(axes))
+    assert np.array_equal(made.dense, np.concatenate((free, -free)))
+    smooth = np.kron(np.vstack(orders[1:])[:, first:last], np.eye(axes))
+    hessian = 2.0 * weight * smooth.T @ smooth
+    size = len(hessian)
+    band = np.zeros((size, width + 1))
+    for c in range(size):
+        for r in range(c, min(c + width + 1, size)):
+            band[c, r - c] = hessian[r, c]
+    assert made.band.reshape(size, width + 1) == pytest.approx(band, rel=1e-12, abs=1e-9)
 
 
 def swerving_reference(n=14, spacing=0.4):

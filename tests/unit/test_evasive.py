@@ -154,6 +154,32 @@ def test_later_starts_fail_and_the_ttr_does_not(junction):
         assert (contact is not None) == hits
 
 
+@pytest.mark.parametrize("which", EvasiveManeuver)
+def test_a_manoeuvre_is_judged_from_where_it_begins_as_the_whole_drive_is(junction, damage, which):
+    judged = set()
+    for ready in (prepared(junction, 1), prepared(damage, 2)):
+        latest = round(ready.conflict.time / ready.scene.dt) - 1
+        for t in ready.scene.dt * np.arange(0, latest + 1, 3):
+            curves = maneuvers_at(
+                ready.reference, t, ready.t_end, which, ready.config.evasive, ready.scene.vehicle
+            )
+            for curve in curves[::3]:
+                driven = SplicedCurve(ready.reference, curve, t)
+                states = ready.checker.drive(driven, ready.t_end)
+                late = states.t >= t - 1e-9
+                clear = ready.checker.contact(driven, ready.t_end) is None
+                on_road = (
+                    ready.checker.road.first_off_road(
+                        states.x[late], states.y[late], states.orientation[late]
+                    )
+                    is None
+                )
+                for road, kept in ((False, clear), (True, clear and on_road)):
+                    assert ready.checker.is_free(ready.reference, curve, ready.t_end, road=road) == kept
+                    judged.add(kept)
+    assert judged == {True, False} or which is KICK
+
+
 def test_boxes_are_never_later_than_rectangles_plus_a_step(junction):
     boxes = times_of(prepared(junction, 1, "evasive.collision=boxes"))
     assert boxes.ttb <= times_of(prepared(junction, 1)).ttb + 0.1 + 1e-9
