@@ -24,7 +24,7 @@ from repair.vehicle.transitions_fast import clearly_drivable
 from repair.world.collision import CollisionWorld
 from repair.world.road import RoadBoundary, grouping
 from repair.world.road_corridor import RoadCorridor
-from repair.world.tracks import INSTANT
+from repair.world.tracks import AFTER, BEFORE, INSTANT
 
 EGO = load_vehicle(1)
 
@@ -245,6 +245,7 @@ def test_margin_and_contact_are_looked_for_at_once(seed):
     asked = {"margin": margin, "beside": frozenset(beside), "since": int(rng.integers(0, 5))}
     near, contact = (world.contact_along(here, heading, start, **keys) for keys in (asked, {}))
     assert world.met_along(here, heading, start, step, **asked) == (near, contact)
+    assert world.contact_along(here, heading, start, **asked, all_pairs=True) == near
 
 
 @settings(max_examples=60, derandomize=True, deadline=None)
@@ -253,15 +254,20 @@ def test_pairs_are_looked_at_in_the_order_of_time(seed):
     rng = np.random.default_rng(seed)
     late_crowd = [replace(one, late=int(rng.integers(-1, 2))) for one in crowd(rng)]
     table = CollisionWorld(late_crowd, EGO, 0.1, 20, 2)._table
-    tracks, since, last = len(table.kind), int(rng.integers(0, 3)), 12
-    ego = rng.integers(since, last + 1, int(rng.integers(0, 30)) if tracks else 0)
-    track = rng.integers(0, max(tracks, 1), len(ego))
+    tracks, last = len(table.kind), 12
+    since = rng.integers(0, 3, tracks)
+    track = rng.integers(0, tracks, int(rng.integers(0, 30))) if tracks else np.zeros(0, dtype=int)
+    ego = rng.integers(since[track], last + 1)
     expected = set()
     for k, m in zip(ego.tolist(), track.tolist(), strict=True):
-        expected.add((k, k, m))
-        if table.mode[m] != INSTANT:
-            expected |= {(max(k - 1, since), k, m), (k, min(k + 1, last), m)}
-    assert list(table.intervals(ego, (ego + 3) * tracks + track, since, last)) == sorted(expected)
+        there = np.isfinite(table.heading.reshape(-1, tracks)[3:, m])
+        beside = [(j, j + 1) for j in (k - 1, k) if since[m] <= j < last and table.mode[m] != INSTANT]
+        held = {BEFORE: (k, k + 1) in beside, AFTER: (k - 1, k) in beside}
+        if not held.get(table.mode[m], any(there[i + j - k] for i, j in beside)):
+            expected.add((k, m, k))
+        expected |= {(i, m, j) for i, j in beside}
+    found = [(i, m, j) for i, j, m in table.intervals(ego, (ego + 3) * tracks + track, since, last)]
+    assert found == sorted(expected)
 
 
 # --------------------------------------------------------------------- limits

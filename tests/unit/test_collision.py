@@ -228,6 +228,30 @@ def test_who_strikes_from_behind(row, behind):
     assert contact.from_behind is behind
 
 
+@pytest.mark.parametrize("role", ["static", "set_based"])
+@pytest.mark.parametrize("v", [1.0, 5.0, 9.0, 13.0, 25.0])
+def test_who_leaves_a_margin_that_it_starts_in_does_not_enter_it(role, v):
+    """Wherever between two samples it is left; and not only by the looks that mostly settle it."""
+    behind = np.tile([-HALF[0] - 0.3 - 2.0, 0.0, 0.0, 2.0, 1.0], (11, 1))
+    world = CollisionWorld([obstacle(behind, role=role)], EGO, 0.1, 10)
+    here, turn = v * np.arange(41) * 0.025 + 0j, np.zeros(41)
+    beside = world.met_at(0, 0j, 0.0, 0.5)
+    assert beside == {0}
+    for keys in ({}, {"all_pairs": True}):
+        assert world.contact_along(here, turn, margin=0.5, beside=beside, **keys) is None
+    back = np.concatenate((here[:21], here[19::-1]))  # and it comes back
+    entered = world.contact_along(back, turn, margin=0.5, beside=beside)
+    assert entered is not None
+    assert entered.time == pytest.approx(1.0 - 0.2 / v, abs=2e-3)
+
+
+def test_of_those_touched_at_the_same_instant_the_first_is_named():
+    rows = np.tile([0.0, 0.0, 0.0, 2.0, 1.0], (11, 1))
+    gone = replace(obstacle(rows, id=2), late=1)  # there at the steps, too
+    world = CollisionWorld([obstacle(rows, id=1), gone], EGO, 0.1, 10)
+    assert first_collision(world, *at_rest()) == (0.0, 1)
+
+
 def test_malformed_queries_raise():
     world = CollisionWorld([], EGO, 0.1, 10)
     with pytest.raises(ValueError, match="samples 1 to 42"):

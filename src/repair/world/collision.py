@@ -52,9 +52,6 @@ class _Asked(NamedTuple):
     all_pairs: bool
 
 
-_EVERYTHING = _Asked(0j, frozenset(), 0, False)
-
-
 class CollisionWorld:
     """The obstacles over time, built once, asked many times.
 
@@ -184,12 +181,15 @@ class CollisionWorld:
             return None, None
         spare, reach = ego_room(here, orientation, self._radius)
         ego, row = self._open(here, orientation, reach, ego, row, asked.margin)
-        near_ego, near_row = self._counted(here, orientation, start, ego, row, asked)
-        near = self._closely(here, orientation, start, spare, near_ego, near_row, asked)
+        counting = self._counting(here, orientation, start, asked)
+        counted = ego >= counting[row % len(self._table.kind)]
+        near = self._closely(
+            here, orientation, start, spare, ego[counted], row[counted], asked.margin, counting
+        )
         contact = None
         if near is not None or beside or since:  # else who never enters the margin touches nothing
-            ego, row = self._open(here, orientation, reach, ego, row, _EVERYTHING.margin)
-            contact = self._closely(here, orientation, start, spare, ego, row, _EVERYTHING)
+            ego, row = self._open(here, orientation, reach, ego, row, 0j)
+            contact = self._closely(here, orientation, start, spare, ego, row, 0j, np.zeros_like(counting))
         return (
             None if near is None else self._told(near, here, orientation),
             None if contact is None else self._told(contact, here, orientation),
@@ -213,13 +213,16 @@ class CollisionWorld:
             ego, row = self._table.everything(len(here), start)
         else:
             ego, row = self._table.near(here, start, step, asked.margin)
-        ego, row = self._counted(here, orientation, start, ego, row, asked)
+        counting = self._counting(here, orientation, start, asked)
+        if asked.since or asked.beside:
+            counted = ego >= counting[row % len(self._table.kind)]
+            ego, row = ego[counted], row[counted]
         if not len(ego):
             return None
         spare, reach = ego_room(here, orientation, self._radius)
         if not asked.all_pairs:
             ego, row = self._open(here, orientation, reach, ego, row, asked.margin)
-        return self._closely(here, orientation, start, spare, ego, row, asked)
+        return self._closely(here, orientation, start, spare, ego, row, asked.margin, counting)
 
     def _require(self, here: Points, orientation: Array, start: int) -> None:
         """Poses within the scenario, and finite ones."""
@@ -233,15 +236,6 @@ class CollisionWorld:
         ):
             raise ValueError("the ego's poses are not finite")
 
-    def _counted(
-        self, here: Points, orientation: Array, start: int, ego: Index, row: Index, asked: _Asked
-    ) -> tuple[Index, Index]:
-        """The pairs that count."""
-        if not (asked.since or asked.beside):
-            return ego, row
-        counted = ego >= self._counting(here, orientation, start, asked)[row % len(self._table.kind)]
-        return ego[counted], row[counted]
-
     def _open(
         self, here: Points, orientation: Array, reach: Array, ego: Index, row: Index, margin: complex
     ) -> tuple[Index, Index]:
@@ -252,6 +246,8 @@ class CollisionWorld:
     def _counting(self, here: Points, orientation: Array, start: int, asked: _Asked) -> Index:
         """Sample from which on each track counts: when the ego has been clear of those that it is beside."""
         since = np.full(len(self._table.kind), asked.since, dtype=np.intp)
+        if not asked.beside:
+            return since
         for m in (m for m, owner in enumerate(self._table.owner) if owner in asked.beside):
             ego = np.arange(len(here))
             row = (ego + start) * len(self._table.kind) + m
@@ -269,12 +265,12 @@ class CollisionWorld:
         none, ego = np.zeros(1), np.zeros(len(tracks), dtype=np.intp)
         wide = margin * (1 + 1j)
         near = self._unsettled(here, turn, None, ego, row, wide)
-        asked = _Asked(wide, frozenset(), 0, True)
+        since = np.zeros_like(tracks)
         return frozenset(
             self._table.owner[m]
             for m in np.flatnonzero(near).tolist()
             if self._table.kind[m] != POLYGON
-            or self._closely(here, turn, sample, none, ego[:1], row[m : m + 1], asked) is not None
+            or self._closely(here, turn, sample, none, ego[:1], row[m : m + 1], wide, since) is not None
         )
 
     def _unsettled(
@@ -307,13 +303,13 @@ class CollisionWorld:
 
     def _closely(
         self, here: Points, orientation: Array, start: int, spare: Array, ego: Index, row: Index,
-        asked: _Asked,
+        margin: complex, since: Index,
     ) -> _Hit | None:  # fmt: skip
         """First contact of pairs of samples and shapes, until the samples around, by advancement."""
-        half, unit, table = self._half + asked.margin, self.dt / self.substeps, self._table
+        half, unit, table = self._half + margin, self.dt / self.substeps, self._table
         best: _Hit | None = None
         until = math.inf
-        for first, after, track in table.intervals(ego, row, asked.since, len(here) - 1):
+        for first, after, track in table.intervals(ego, row, since, len(here) - 1):
             if (first + start) * unit >= until:  # the others begin later
                 break
             in_time()

@@ -142,7 +142,7 @@ class TrackTable:
         ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
         return ego, (ego + start) * len(self.kind) + track
 
-    def intervals(self, ego: Index, row: Index, since: int, last: int) -> Iterator[tuple[int, int, int]]:
+    def intervals(self, ego: Index, row: Index, since: Index, last: int) -> Iterator[tuple[int, int, int]]:
         """Pairs of a sample and a shape as the two intervals beside it, or as the instant that it is.
 
         An instant is there where no interval that ends there, or begins, holds the shape at it.
@@ -150,30 +150,34 @@ class TrackTable:
         Parameters
         ----------
         ego, row : (n,) array
-        since, last : int
-            The first of the ego's samples that counts, and the last one.
+        since : (M,) array
+            For each track the first of the ego's samples that counts: nothing is looked at before it.
+        last : int
+            The last of them.
 
         Yields
         ------
         (first, after, track)
-            The interval's samples, the same one twice for an instant; each once, in the order of time.
+            The interval's samples, the same one twice for an instant; each once, in the order of time and,
+            of those that begin together, of the tracks.
         """
         track = row % len(self.kind)
         at: dict[int, set[int]] = {}
         for k, m in zip(ego.tolist(), track.tolist(), strict=True):
             at.setdefault(k, set()).add(m)
         alone: dict[int, set[int]] = {}
-        only = ~self._held(ego, row, self.mode[track], since, last)
+        only = ~self._held(ego, row, self.mode[track], since[track], last)
         for k, m in zip(ego[only].tolist(), track[only].tolist(), strict=True):
             alone.setdefault(k, set()).add(m)
+        counted = since.tolist()
         for first in sorted({j for k in at for j in (k - 1, k)}):
-            here, following = at.get(first, _NOBODY), at.get(first + 1, _NOBODY)
-            if first in alone:
-                yield from ((first, first, m) for m in sorted(alone[first]))
-            if since <= first < last:
-                yield from ((first, first + 1, m) for m in sorted(here | following) if not self._instant[m])
+            pairs = [(m, first) for m in alone.get(first, _NOBODY)]
+            if first < last:
+                both = at.get(first, _NOBODY) | at.get(first + 1, _NOBODY)
+                pairs += [(m, first + 1) for m in both if first >= counted[m] and not self._instant[m]]
+            yield from ((first, after, m) for m, after in sorted(pairs))
 
-    def _held(self, ego: Index, row: Index, mode: Index, since: int, last: int) -> npt.NDArray[np.bool_]:
+    def _held(self, ego: Index, row: Index, mode: Index, since: Index, last: int) -> npt.NDArray[np.bool_]:
         """Whether an interval that ends at a sample, or begins there, holds the shape of that sample."""
         count, most = len(self.kind), len(self.heading) - 1
         ends, begins = ego > since, ego < last
