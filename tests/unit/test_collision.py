@@ -246,10 +246,11 @@ def test_who_leaves_a_margin_that_it_starts_in_does_not_enter_it(role, v):
 
 
 def test_of_those_touched_at_the_same_instant_the_first_is_named():
-    rows = np.tile([0.0, 0.0, 0.0, 2.0, 1.0], (11, 1))
-    gone = replace(obstacle(rows, id=2), late=1)  # there at the steps, too
-    world = CollisionWorld([obstacle(rows, id=1), gone], EGO, 0.1, 10)
-    assert first_collision(world, *at_rest()) == (0.0, 1)
+    there = np.tile([0.0, 0.0, 0.0, 2.0, 1.0], (11, 1))
+    rows = there.copy()
+    rows[3:, 0] = 60.0  # gone from step 3 on; the checker still has it at step 3
+    world = CollisionWorld([obstacle(there), replace(obstacle(rows, id=2), late=1)], EGO, 0.1, 10)
+    assert first_collision(world, *(a[12:] for a in at_rest()), start=12) == (pytest.approx(0.3), 1)
 
 
 def test_malformed_queries_raise():

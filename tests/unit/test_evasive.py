@@ -13,7 +13,7 @@ from repair.api import find, repair, search
 from repair.baselines.evasive.at_ttr import AtTtr
 from repair.baselines.evasive.maneuvers import EvasiveManeuver, maneuvers_at
 from repair.baselines.evasive.settings import EvasiveConfig
-from repair.baselines.evasive.times import EvasiveStatus, evasive_ttr
+from repair.baselines.evasive.times import EvasiveStatus, brakes_free, evasive_ttr
 from repair.config import load_config
 from repair.curves.base import Curve, SplicedCurve
 from repair.metrics.base import Asked
@@ -178,6 +178,15 @@ def test_a_manoeuvre_is_judged_from_where_it_begins_as_the_whole_drive_is(juncti
                     assert ready.checker.is_free(ready.reference, curve, ready.t_end, road=road) == kept
                     judged.add(kept)
     assert judged == {True, False} or which is KICK
+
+
+def test_braking_after_the_contact_avoids_nothing(junction):
+    ready = prepared(junction, 1)
+    met, end = ready.conflict.contact_time, ready.t_end
+    late = [float(t) for t in ready.scene.dt * np.arange(1, 40) if met < t < end]
+    assert not any(brakes_free(ready, ready.config.evasive, t) for t in late)
+    curves = [maneuvers_at(ready.reference, t, end, BRAKE, ready.config.evasive, VEHICLE)[0] for t in late]
+    assert any(ready.checker.is_free(ready.reference, c, end, road=False) for c in curves)  # and it is past
 
 
 def test_boxes_are_never_later_than_rectangles_plus_a_step(junction):

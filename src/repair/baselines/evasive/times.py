@@ -156,7 +156,8 @@ def _escape(
 def _is_free(situation: Situation, curve: EvasiveCurve, collision: str, road: bool) -> bool:
     checker, t_end = situation.checker, situation.t_end
     if collision != "boxes":
-        return checker.is_free(situation.reference, curve, t_end, road=road)
+        before = situation.conflict.contact_time < curve.t_start - INSTANT  # it is too late then
+        return not before and checker.is_free(situation.reference, curve, t_end, road=road)
     driven, times = SplicedCurve(situation.reference, curve, curve.t_start), checker.times(t_end)
     after = driven.sample(times[times >= curve.t_start - INSTANT])
     if first_entry(situation.occupancy, after) is not None:
