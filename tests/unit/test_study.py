@@ -15,7 +15,7 @@ import sys
 import time
 from collections import Counter
 from concurrent.futures import Future
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import pytest
@@ -233,6 +233,17 @@ def test_a_row_is_there_once(study, tmp_path):
             store.base.execute("UPDATE rows SET f_ttr_s = 'inf'")
         assert unpacked(store.whole(0))["record"]["backend"] == "ego"
         assert store.whole(5) is None
+
+
+def test_a_store_that_another_program_holds_is_an_error_in_words(tmp_path, monkeypatch):
+    monkeypatch.setattr("repair.study.store._PATIENCE", 0.01)
+    with Store(tmp_path) as store, closing(sqlite3.connect(store.path, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        for write in (lambda: store.tell(study="it"), lambda: store.plan(())):
+            with pytest.raises(OutputError, match=r"cannot be written to .*: database is locked"):
+                write()
+        other.execute("ROLLBACK")
+        store.tell(study="it")
 
 
 def test_a_store_of_another_version_is_refused(tmp_path):

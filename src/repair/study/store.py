@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -137,16 +137,29 @@ class Store:
             raise RepairError(f"the store {self.path} cannot be used: {in_words(error)}") from error
 
     def tell(self, **words: str) -> None:
-        """Note something about the study."""
-        self.base.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", words.items())
+        """Note something about the study.
+
+        Raises
+        ------
+        OutputError
+            As :meth:`add`.
+        """
+        with self._written("what is told of it"):
+            self.base.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", words.items())
 
     def plan(self, tasks: Iterable[Task]) -> None:
-        """Note what the study is; rows that are no part of it stay, and are not shown."""
+        """Note what the study is; rows that are no part of it stay, and are not shown.
+
+        Raises
+        ------
+        OutputError
+            As :meth:`add`.
+        """
         listed = []
         for k, t in enumerate(tasks):
             words = (t.key, t.file, t.path, t.sha256, t.backend, t.reference, t.variation)
             listed.append((k, *map(_storable, words), json.dumps(dict(t.varied))))
-        with self._whole():
+        with self._written("what is to be made"):
             self.base.execute("DELETE FROM tasks")
             self.base.executemany(f"INSERT INTO tasks VALUES ({', '.join('?' * 9)})", listed)
 
@@ -171,17 +184,13 @@ class Store:
         held = [_storable(row[name]) for name in self.table.columns]
         values = [task.key, task.sha256, task.config_sha256, package_version(), *held, whole]
         names = ("key", "sha256", "config_sha256", "version", *self.table.columns, "result")
-        try:
-            with self._whole():
-                # A row that a limit has ended makes room for what came of another limit.
-                lost = "status IN ('timeout', 'memory')"
-                self.base.execute(f"DELETE FROM rows WHERE key = ? AND {lost}", (task.key,))
-                self.base.execute(
-                    f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})",
-                    values,
-                )
-        except sqlite3.Error as error:
-            raise OutputError(f"a row cannot be written to {self.path}: {in_words(error)}") from error
+        with self._written("a row"):
+            # A row that a limit has ended makes room for what came of another limit.
+            lost = "status IN ('timeout', 'memory')"
+            self.base.execute(f"DELETE FROM rows WHERE key = ? AND {lost}", (task.key,))
+            self.base.execute(
+                f"INSERT INTO rows ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})", values
+            )
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The rows of the study in its order, as far as they are there, with the settings that vary."""
@@ -214,8 +223,14 @@ class Store:
         query = f"SELECT tasks.*, rows.key IS NOT NULL AS done FROM {joined}"
         return [dict(row) | {"done": bool(row["done"])} for row in self.base.execute(query)]
 
-    def _whole(self) -> _Transaction:
-        return _Transaction(self.base)
+    @contextmanager
+    def _written(self, what: str) -> Iterator[None]:
+        """All that is written within, or nothing and an error in words."""
+        try:
+            with _Transaction(self.base):
+                yield
+        except sqlite3.Error as error:
+            raise OutputError(f"{what} cannot be written to {self.path}: {in_words(error)}") from error
 
 
 def _storable(value: Any) -> Any:
