@@ -235,6 +235,27 @@ def test_a_row_is_there_once(study, tmp_path):
         assert store.whole(5) is None
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are blocked on POSIX systems only")
+def test_processes_start_deaf_to_an_interrupt(monkeypatch):
+    """Ctrl-C while they import is for who starts them: each printed a traceback of its own."""
+
+    def blocked():
+        return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+    class Starts:
+        def __init__(self, **_):
+            self.heard = []
+
+        def submit(self, *_):
+            self.heard.append(not blocked())
+
+    monkeypatch.setattr("joblib.externals.loky.ProcessPoolExecutor", Starts)
+    (lane,) = LocalLanes(1).lanes
+    lane.give(None)
+    assert lane.executor.heard == [False, True]  # the first starts the process; then it is as before
+    assert not blocked()
+
+
 def test_a_store_that_another_program_holds_is_an_error_in_words(tmp_path, monkeypatch):
     monkeypatch.setattr("repair.study.store._PATIENCE", 0.01)
     with Store(tmp_path) as store, closing(sqlite3.connect(store.path, isolation_level=None)) as other:

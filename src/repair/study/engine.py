@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+import signal
+import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -81,10 +84,11 @@ class _Local:
             from joblib.externals.loky import ProcessPoolExecutor
 
             threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-            self.executor = ProcessPoolExecutor(
-                max_workers=1, initializer=begin, initargs=(os.getpid(), self.parts), env=threads
-            )
-            self.hello = self.executor.submit(started)
+            with _no_interrupts():
+                self.executor = ProcessPoolExecutor(
+                    max_workers=1, initializer=begin, initargs=(os.getpid(), self.parts), env=threads
+                )
+                self.hello = self.executor.submit(started)
         made: Future[Answer] = self.executor.submit(self.work, task)
         return made
 
@@ -96,6 +100,25 @@ class _Local:
             self.executor.shutdown(wait=True, kill_workers=True)
         self.executor = self.hello = None
         return True
+
+
+@contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C, even before their first line; here it is heard afterwards."""
+    if sys.platform == "win32":
+        yield
+        return
+    import multiprocessing.resource_tracker as own
+
+    from joblib.externals.loky.backend import resource_tracker
+
+    for tracker in (own, resource_tracker):  # as they start they have it heard again
+        tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class LocalLanes:
