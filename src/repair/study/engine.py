@@ -268,7 +268,7 @@ def _answer(ended: _Busy) -> Answer:
         words = one_line(error)
         if f"EXIT({TOO_MUCH_MEMORY})" in words:
             return _lost(task, "memory", task.too_much)
-        if spent >= task.timeout:
+        if spent >= task.timeout - 2.0 * _LOOKS:  # that it had begun may have been noticed a look later
             return _lost(task, "timeout", task.too_late)
         how = re.search(r"\{(.*?)\}", words)
         return _lost(task, "crash", f"the worker process ended: {how.group(1) if how else words}")
