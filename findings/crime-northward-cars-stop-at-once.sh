@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
-# CommonRoad-CriMe: a jerk along a road that runs north on the map is a lateral one.
+# CommonRoad-CriMe: on a road that runs north on the map a car needs 0 m to stop, and its braking jerk is a lateral one.
 #
 # Expected: longitudinal jerk (LongJ) and lateral jerk (LatJ) are along and across the vehicle; a car that begins to brake by
-# 5 m/s³ on a straight road has 5 and 0 m/s³, whichever way the road runs.
+# 5 m/s³ on a straight road has 5 and 0 m/s³, and a stopping distance (MSD) of v^2 / 2a, whichever way the road runs.
 # What happens: the jerk along the vehicle is divided by the cosine and the sine of the lane's heading on the map: it is 5 and
 # 0 m/s³ eastwards, 3.54 and 3.54 m/s³ to the north-east, 0 and 5 m/s³ northwards. A jerk across the vehicle is in neither.
-# Why it matters: comfort limits differ along and across, and passengers of a car that brakes northwards are, by these
-# measures, not braked but thrown to the side.
+# The speed for MSD is multiplied by that cosine: half of the distance to the north-east, 0 m northwards.
+# Why it matters: northwards no scene is critical by MSD and PSD, which divides by it; comfort limits differ along and
+# across, and passengers of a car that brakes northwards are, by these measures, thrown to the side.
 #
 # Output seen:
 #   commonroad-crime 0.4.5
-#   east: LongJ 5.00 m/s³, LatJ 0.00 m/s³
-#   north-east: LongJ 3.54 m/s³, LatJ 3.54 m/s³
-#   north: LongJ 0.00 m/s³, LatJ 5.00 m/s³
-#   west: LongJ 5.00 m/s³, LatJ 0.00 m/s³
+#   east: LongJ 5.00 m/s³, LatJ 0.00 m/s³, MSD 4.26 m
+#   north-east: LongJ 3.54 m/s³, LatJ 3.54 m/s³, MSD 2.13 m
+#   north: LongJ 0.00 m/s³, LatJ 5.00 m/s³, MSD 0.00 m
+#   west: LongJ 5.00 m/s³, LatJ 0.00 m/s³, MSD 4.26 m
 #   behaviour as stated
 set -euo pipefail
 dir=$(mktemp -d)
@@ -35,7 +36,7 @@ from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import CustomState, InitialState
 from commonroad.scenario.trajectory import Trajectory
 from commonroad_crime.data_structure.configuration import CriMeConfiguration
-from commonroad_crime.measure import LatJ, LongJ
+from commonroad_crime.measure import MSD, LatJ, LongJ
 
 logging.disable(logging.CRITICAL)
 print('commonroad-crime', version('commonroad-crime'))
@@ -58,12 +59,14 @@ def braking(heading):
     return config
 
 
-ok = True
+ok, east = True, 0.0
 for name, degrees in (('east', 0.0), ('north-east', 45.0), ('north', 90.0), ('west', 180.0)):
     heading = math.radians(degrees)
-    along, across = (float(measure(braking(heading)).compute(time_step=2, verbose=False)) for measure in (LongJ, LatJ))
-    print(f'{name}: LongJ {along:.2f} m/s³, LatJ {across:.2f} m/s³')
+    along, across, stop = (float(measure(braking(heading)).compute(time_step=2, verbose=False)) for measure in (LongJ, LatJ, MSD))
+    print(f'{name}: LongJ {along:.2f} m/s³, LatJ {across:.2f} m/s³, MSD {stop:.2f} m')
+    east = stop if degrees == 0.0 else east
     ok = ok and abs(along - abs(5.0 * math.cos(heading))) < 0.01 and abs(across - abs(5.0 * math.sin(heading))) < 0.01
+    ok = ok and east > 4.0 and abs(stop - east * math.cos(heading) ** 2) < 0.02
 print('behaviour as stated' if ok else 'behaviour has changed')
 raise SystemExit(not ok)
 PY
