@@ -71,10 +71,10 @@ def recording(name, heading, places):
 t = STEP * np.arange(-PAST, FUTURE + 1)
 ok = True
 for name, heading, x in (('forward', math.pi, -2.0 * t), ('in reverse', 0.0, -2.0 * t), ('in reverse, faster', 0.0, -2.0 * t - 0.1 * t**2)):
-    helper = recording(name, heading, x.tolist())
-    speed = helper.get_velocity_for_agent('i', f's{PAST}')
-    acceleration = helper.get_acceleration_for_agent('i', f's{PAST}')
-    ends = [float(model(6.0, helper)(f'i_s{PAST}').prediction[0, -1, 0]) for model in (ConstantVelocityHeading, PhysicsOracle)]
+    data = recording(name, heading, x.tolist())
+    speed = data.get_velocity_for_agent('i', f's{PAST}')
+    acceleration = data.get_acceleration_for_agent('i', f's{PAST}')
+    ends = [float(model(6.0, data)(f'i_s{PAST}').prediction[0, -1, 0]) for model in (ConstantVelocityHeading, PhysicsOracle)]
     print(f'{name}: {speed:.2f} m/s, {acceleration:+.2f} m/s², after 6 s at {x[-1]:+.1f} m; '
           f'constant velocity {ends[0]:+.1f} m, best of four {ends[1]:+.1f} m')
     if name == 'forward':
