@@ -12,6 +12,7 @@ import re
 import signal
 import sys
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -139,6 +140,8 @@ class LocalLanes:
     def __init__(self, count: int, work: Work = run_task) -> None:
         if count < 1:
             raise RepairError(f"{count} worker processes are asked for; at least one is needed")
+        # A worker that has grown by 300 MB ends itself after a row, and another one takes the next: no news.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         parts = parts_of_the_program()
         self.lanes = [_Local(f"worker {k + 1}", work, parts) for k in range(count)]
 
