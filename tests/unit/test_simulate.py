@@ -24,7 +24,7 @@ from repair.simulate.data import CycleRecord, Driven
 from repair.simulate.many.case import simulation_config
 from repair.simulate.many.run import Simulation, drives_in, tasks_of
 from repair.simulate.measures import SIMULATION, row_of
-from repair.simulate.near import anybody_near, within_reach
+from repair.simulate.near import ASIDE, anybody_near, within_reach
 from repair.simulate.policies.registry import POLICIES, make_policy
 from repair.simulate.predictions.network import Network
 from repair.simulate.predictions.registry import PREDICTIONS, make_predictor
@@ -64,6 +64,27 @@ def circling(radius=30.0, v=8.0, steps=60) -> np.ndarray:
 def believed(name: str, states: np.ndarray, step: int, *, shift=0, lanes=None, **keys):
     world = World((body(states),), DT, len(states) - 1 - shift, shift, lanes or {})
     return Beliefs(world, make_predictor(name, SimulateConfig(**keys)), 30).at(step)
+
+
+@pytest.mark.parametrize("name", PREDICTIONS.names())
+def test_who_is_not_asked_about_does_not_come_near(name):
+    rng = np.random.default_rng(3)
+    crowd = []
+    for k in range(60):
+        x, y, heading, v = rng.uniform((-150, -150, -3, 0), (150, 150, 3, 20))
+        states = (
+            straight(x, y, heading, v) if k % 2 else circling(rng.uniform(20, 60), v) + np.array([x, y, 0, 0])
+        )
+        crowd.append(body(states, name=k))
+    path = np.column_stack([np.linspace(0.0, 50.0, 14), np.zeros(14)])
+    world = World(tuple(crowd), DT, 60)
+    every, some = (Beliefs(world, make_predictor(name, SimulateConfig()), 30) for _ in range(2))
+    asked = some.around(10, path.min(axis=0), path.max(axis=0), ASIDE)
+    near = [one.id for one in within_reach(every.at(10), path)]
+    assert 0 < len(near) < 60
+    assert [one.id for one in within_reach(asked, path)] == near
+    assert (len(asked) < 60) == getattr(every.predictor, "at_the_speed_of_now", False)
+    assert [one.id for one in some.at(10)] == [one.id for one in every.at(10)]  # asked later, in order
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from repair.config.schema import Config
 from repair.curves.base import Curve
 from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.obstacle import Obstacle, Traffic
-from repair.simulate.near import anybody_near, within_reach
+from repair.simulate.near import ASIDE, anybody_near, within_reach
 from repair.simulate.watch import Found, Looked, Watch
 from repair.simulate.world import Beliefs, displaced, widened
 from repair.vehicle.states import DrivenStates
@@ -167,7 +167,9 @@ class Sight:
     @cached_property
     def _near(self) -> tuple[Obstacle, ...]:
         """Who is believed to come near the way."""
-        return within_reach(self.eyes.grounds.beliefs.at(self.step), self._path)
+        low, high = self._path.min(axis=0), self._path.max(axis=0)
+        believed = self.eyes.grounds.beliefs.around(self.step, low, high, ASIDE)
+        return within_reach(believed, self._path)
 
     @cached_property
     def _path(self) -> Array:

@@ -10,9 +10,10 @@ from repair.arrays import Array
 from repair.scene.traffic.obstacle import Obstacle
 from repair.vehicle.parameters import Vehicle
 
-__all__ = ["anybody_near", "within_reach"]
+__all__ = ["ASIDE", "anybody_near", "within_reach"]
 
-_ASIDE = 12.0  # who stays farther from the path is met on no way around anybody [m]
+#: Who stays farther from the path is met on no way around anybody [m].
+ASIDE = 12.0
 
 
 def within_reach(obstacles: Iterable[Obstacle], path: Array) -> tuple[Obstacle, ...]:
@@ -29,7 +30,7 @@ def within_reach(obstacles: Iterable[Obstacle], path: Array) -> tuple[Obstacle, 
             kept.append(one)
             continue
         outline = one.vertices[int(np.isfinite(one.vertices[:, 0, 0]).argmax())]
-        reach = _ASIDE + float(np.hypot(outline[:, 0] - x[0], outline[:, 1] - y[0]).max())
+        reach = ASIDE + float(np.hypot(outline[:, 0] - x[0], outline[:, 1] - y[0]).max())
         beside = (x >= low_x - reach) & (x <= high_x + reach) & (y >= low_y - reach) & (y <= high_y + reach)
         if not beside.any():  # the others are farther
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -65,7 +66,7 @@ class Beliefs:
     world: World
     predictor: Predictor
     lookahead: int
-    _made: dict[int, tuple[Obstacle, ...]] = field(default_factory=dict)
+    _made: dict[int, dict[int, Obstacle | None]] = field(default_factory=dict)
 
     def ahead(self, step: int) -> int:
         """How far is looked at a step of the drive [steps]: never beyond the record's end."""
@@ -73,12 +74,45 @@ class Beliefs:
 
     def at(self, step: int) -> tuple[Obstacle, ...]:
         """Everybody from a step of the drive on, over ``ahead(step) + 1`` rows."""
-        if step not in self._made:
-            found = (self._one(o, self.world.shift + step, self.ahead(step)) for o in self.world.obstacles)
-            self._made[step] = tuple(
-                o for o in found if o is not None and bool(np.isfinite(o.vertices).any())
-            )
-        return self._made[step]
+        return self.around(step, np.full(2, -np.inf), np.full(2, np.inf), 0.0)
+
+    def around(self, step: int, low: Array, high: Array, reach: float) -> tuple[Obstacle, ...]:
+        """As :meth:`at`, but for some of those who surely stay farther from a rectangle than ``reach`` [m].
+
+        Parameters
+        ----------
+        step : int
+        low, high : (2,) array
+            Smallest and largest x and y of the rectangle [m].
+        reach : float
+            Between an outline and the rectangle.
+        """
+        made, now, ahead = self._made.setdefault(step, {}), self.world.shift + step, self.ahead(step)
+        (left, bottom), (right, top) = low.tolist(), high.tolist()
+        for k, record in enumerate(self.world.obstacles):
+            if k in made:
+                continue
+            place = self._stays_within(record, now, ahead)
+            if place is not None:
+                x, y, room = place
+                if not (left <= x + room + reach and x - room - reach <= right):
+                    continue
+                if not (bottom <= y + room + reach and y - room - reach <= top):
+                    continue
+            one = self._one(record, now, ahead)
+            made[k] = one if one is not None and bool(np.isfinite(one.vertices).any()) else None
+        return tuple(one for _, one in sorted(made.items()) if one is not None)
+
+    def _stays_within(self, record: Obstacle, now: int, n_steps: int) -> tuple[float, float, float] | None:
+        """A circle that somebody is believed not to leave: x, y and radius [m]; None: nobody knows."""
+        if not getattr(self.predictor, "at_the_speed_of_now", False) or record.role in _STATED:
+            return None
+        x, y, _, speed = record.states[now].tolist()
+        if record.polygons or not math.isfinite(x + y + speed):
+            return None
+        outline = record.vertices[now]
+        size = float(np.hypot(outline[:, 0] - x, outline[:, 1] - y).max())
+        return x, y, size + abs(speed) * n_steps * self.world.dt
 
     def _one(self, record: Obstacle, now: int, n_steps: int) -> Obstacle | None:
         if record.role in _STATED:

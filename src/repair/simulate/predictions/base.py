@@ -53,8 +53,9 @@ class Predictor(Protocol):
     """As commonroad-prediction has it, ``predict(scenario, initial_time_step)``, on arrays and one by one.
 
     A class with ``looks_ahead = True`` is given the whole record, those to come included. All others are
-    given the past alone. One with ``to_the_end = True`` is asked until the record's end where
-    ``simulate.lookahead`` does not say how far.
+    given the past alone. One with ``at_the_speed_of_now = True`` takes nobody farther from where he is than
+    his speed of now does, so that who is far away is not asked about. One with ``to_the_end = True`` is asked
+    until the record's end where ``simulate.lookahead`` does not say how far.
     """
 
     def predict(self, known: Known) -> Obstacle | None:

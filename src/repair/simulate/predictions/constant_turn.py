@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ class ConstantTurn:
     Schubert, Richter and Wanielik, *Comparison and evaluation of advanced motion models for vehicle
     tracking*, FUSION 2008, eq. 4. Who was seen once only is taken to go straight on.
     """
+
+    at_the_speed_of_now: ClassVar[bool] = True
 
     def predict(self, known: Known) -> Obstacle | None:
         """From the last 0.3 s."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +20,8 @@ class ConstantVelocity:
     Schubert, Richter and Wanielik, *Comparison and evaluation of advanced motion models for vehicle
     tracking*, FUSION 2008.
     """
+
+    at_the_speed_of_now: ClassVar[bool] = True
 
     def predict(self, known: Known) -> Obstacle | None:
         """From the last row alone."""
