@@ -226,14 +226,13 @@ class Sight:
     def _meets(self, error: float) -> bool:
         grounds, watch = self.eyes.grounds, self.eyes.hard
 
-        def look() -> Looked:
+        def meets() -> bool:
             traffic = Traffic(
                 displaced(self._near, error, grounds.scene.dt), grounds.beliefs.ahead(self.step)
             )
-            return watch.look(self.curve, traffic=traffic, ego=self.ego, now=self.now)
+            return watch.meets(self.curve, traffic=traffic, ego=self.ego)
 
-        looked = self.eyes.timed(look)
-        return looked.conflict.contact_time < float("inf")
+        return self.eyes.timed(meets)
 
     def brakes(self, t: float) -> bool:
         """Whether full braking along the path helps that begins so much later [s]."""

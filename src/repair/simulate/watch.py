@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from repair.arrays import frozen
+from repair.arrays import frozen, wrap
 from repair.check.checker import Checker
+from repair.check.settings import sampled
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
 from repair.cycle.asked import step_of
@@ -21,7 +22,8 @@ from repair.scene.traffic.obstacle import Traffic
 from repair.search.result import SearchResult, SearchStatus
 from repair.simulate.carried import Carried
 from repair.simulate.share import ANEW, Share, Start
-from repair.timegrid import INSTANT
+from repair.timegrid import INSTANT, steps_until
+from repair.world.collision import CollisionWorld
 
 __all__ = ["Found", "Looked", "Watch"]
 
@@ -139,6 +141,22 @@ class Watch(Repairer):
         )
         self._edged = prepared.checker
         return Looked(now, prepared)
+
+    def meets(self, curve: Curve, *, traffic: Traffic, ego: InitialState) -> bool:
+        """Whether a curve touches somebody: that of :meth:`look`, and nothing else is looked at.
+
+        Parameters
+        ----------
+        curve, traffic, ego
+            As there.
+        """
+        scene, n = self.scene, traffic.n_steps
+        substeps = sampled(self.config.checker, scene.dt).substeps
+        steps = min(steps_until(min(n * scene.dt, curve.t_end), scene.dt), n)
+        path = scene.frame.cartesian(curve.sample(np.arange(steps * substeps + 1) * (scene.dt / substeps)))
+        states = scene.model.drive(path, float(wrap(path.heading[0] - ego.orientation)))
+        world = CollisionWorld(traffic.obstacles, scene.vehicle, scene.dt, n, substeps)
+        return world.contact(states.x, states.y, states.orientation) is not None
 
     def answer(
         self,
