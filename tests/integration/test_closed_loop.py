@@ -26,6 +26,7 @@ from repair.simulate.carried import Carried
 from repair.simulate.eyes import Eyes
 from repair.simulate.many.case import Case, case_at, plan_on, simulation_config
 from repair.simulate.many.task import drive_of, run_drive
+from repair.simulate.world import displaced
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +114,21 @@ def test_a_contact_is_sure_that_is_there_ahead_and_behind(cases, doubt, sure):
     sight = Eyes(grounds).sight(case.curve, ego, 0)
     assert sight.alarming("contact")
     assert sight.sure() is sure
+
+
+def test_who_is_met_is_who_a_whole_look_finds(cases):
+    seen = set()
+    for case in cases.values():
+        watch, prepared = case.plan.hard.twin(), case.plan.prepared
+        start, scene = prepared.scene.initial_state, prepared.scene
+        ego = InitialState(start.x, start.y, start.orientation, start.velocity, 0.0, 0.0)
+        for error in (-40.0, -4.0, -0.5, 0.0, 0.5, 4.0, 40.0):
+            traffic = Traffic(displaced(scene.obstacles, error, scene.dt), scene.n_steps)
+            looked = watch.look(prepared.reference, traffic=traffic, ego=ego)
+            met = watch.meets(prepared.reference, traffic=traffic, ego=ego)
+            assert met == (looked.conflict.contact_time < np.inf)
+            seen.add(met)
+    assert seen == {True, False}
 
 
 def test_a_curve_is_looked_at_where_it_is(cases):
