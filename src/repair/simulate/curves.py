@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, wrap
 from repair.curves.base import Curve, FrenetTrajectory, SplicedCurve
 from repair.reference.profile import SpeedProfile
+from repair.scene.scene import Scene
 from repair.timegrid import INSTANT
+from repair.vehicle.states import DrivenStates
 
-__all__ = ["Ahead", "Resumed", "ahead_of", "resumed"]
+__all__ = ["Ahead", "Resumed", "ahead_of", "driven_along", "resumed"]
 
 _FADES = 0.5  # after the end of a curve its motion sideways fades in about so much time [s]
 _BACK_FOR, _BACK_OVER = (
@@ -167,3 +169,13 @@ def _quintic(start: float, slope: float, bend: float, over: float) -> Array:
     ])  # fmt: skip
     table = np.array([[x**3, x**4, x**5], [3 * x**2, 4 * x**3, 5 * x**4], [6 * x, 12 * x**2, 20 * x**3]])
     return frozen([*c, *np.linalg.solve(table, left)])
+
+
+def driven_along(scene: Scene, curve: Curve, times: Array, orientation: float | None) -> DrivenStates:
+    """The vehicle's states along a curve.
+
+    The body begins as it stands [rad]; None: as in steady driving.
+    """
+    path = scene.frame.cartesian(curve.sample(times))
+    slip = None if orientation is None else float(wrap(path.heading[0] - orientation))
+    return scene.model.drive(path, slip)

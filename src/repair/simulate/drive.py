@@ -14,9 +14,9 @@ from repair.baselines.evasive.maneuvers import EvasiveManeuver, maneuvers_at
 from repair.curves.base import Curve
 from repair.scene.scene import InitialState
 from repair.simulate.contact import Struck, first_struck, least_distance
-from repair.simulate.curves import ahead_of, resumed
+from repair.simulate.curves import ahead_of, driven_along, resumed
 from repair.simulate.data import CycleRecord, Driven
-from repair.simulate.eyes import Eyes, Grounds, Sight, driven_along
+from repair.simulate.eyes import Eyes, Grounds, Sight
 from repair.simulate.policies.base import KEEP, Action, Policy
 from repair.vehicle.states import DrivenStates
 

@@ -10,34 +10,24 @@ from typing import TypeVar
 
 import numpy as np
 
-from repair.arrays import Array, wrap
+from repair.arrays import Array
 from repair.baselines.evasive.times import brakes_free
 from repair.check.verdict import Conflict
 from repair.config.schema import Config
 from repair.curves.base import Curve
 from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.obstacle import Obstacle, Traffic
+from repair.simulate.curves import driven_along
 from repair.simulate.near import ASIDE, anybody_near, within_reach
 from repair.simulate.watch import Found, Looked, Watch
 from repair.simulate.world import Beliefs, displaced, widened
-from repair.vehicle.states import DrivenStates
 
-__all__ = ["Eyes", "Grounds", "Sight", "driven_along"]
+__all__ = ["Eyes", "Grounds", "Sight"]
 
 T = TypeVar("T")
 _TRAFFIC = ("margin", "collision")
 _BEFORE, _AFTER = 15.0, 40.0  # who follows, and who is met by speeding up [m]
 NONE = Conflict(float("inf"))
-
-
-def driven_along(scene: Scene, curve: Curve, times: Array, orientation: float | None) -> DrivenStates:
-    """The vehicle's states along a curve.
-
-    The body begins as it stands [rad]; None: as in steady driving.
-    """
-    path = scene.frame.cartesian(curve.sample(times))
-    slip = None if orientation is None else float(wrap(path.heading[0] - orientation))
-    return scene.model.drive(path, slip)
 
 
 @dataclass(eq=False)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from repair.arrays import frozen, wrap
+from repair.arrays import frozen
 from repair.check.checker import Checker
 from repair.check.settings import sampled
 from repair.check.verdict import Conflict
@@ -21,6 +21,7 @@ from repair.scene.scene import InitialState
 from repair.scene.traffic.obstacle import Traffic
 from repair.search.result import SearchResult, SearchStatus
 from repair.simulate.carried import Carried
+from repair.simulate.curves import driven_along
 from repair.simulate.share import ANEW, Share, Start
 from repair.timegrid import INSTANT, steps_until
 from repair.world.collision import CollisionWorld
@@ -153,8 +154,8 @@ class Watch(Repairer):
         scene, n = self.scene, traffic.n_steps
         substeps = sampled(self.config.checker, scene.dt).substeps
         steps = min(steps_until(min(n * scene.dt, curve.t_end), scene.dt), n)
-        path = scene.frame.cartesian(curve.sample(np.arange(steps * substeps + 1) * (scene.dt / substeps)))
-        states = scene.model.drive(path, float(wrap(path.heading[0] - ego.orientation)))
+        times = np.arange(steps * substeps + 1) * (scene.dt / substeps)
+        states = driven_along(scene, curve, times, ego.orientation)
         world = CollisionWorld(traffic.obstacles, scene.vehicle, scene.dt, n, substeps)
         return world.contact(states.x, states.y, states.orientation) is not None
 
