@@ -7,10 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from commonroad.common.file_reader import CommonRoadFileReader
+from commonroad.scenario.state import KSState, PMState
 from commonroad_dc.feasibility.solution_checker import starts_at_correct_state
 from tests import driven
 
 from repair.api import repair
+from repair.errors import ScenarioError
+from repair.scene.start import initial_state_of
 
 FULL = 2.0 * np.pi
 
@@ -38,3 +41,30 @@ def test_the_first_state_is_the_planning_problems(tmp_path, heading, speed):
     turned = [abs(b.orientation - a.orientation) for a, b in pairwise(states)]
     assert all(abs(state.orientation) <= FULL for state in states)
     assert sum(turn > 3.0 for turn in turned) <= 1  # a whole turn where the range that is allowed ends
+
+
+@pytest.mark.parametrize("heading, speed", [(0.0, 5.0), (1.5, 8.0), (-2.8, 0.3)])
+def test_a_point_mass_says_its_speed_along_both_axes(heading, speed):
+    along, across = speed * np.cos(heading), speed * np.sin(heading)
+    read = initial_state_of(
+        PMState(time_step=0, position=np.array([1.0, 2.0]), velocity=along, velocity_y=across)
+    )
+    assert (read.velocity, read.orientation) == pytest.approx((speed, heading))
+
+
+PLACE = np.array([1.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    "state, words",
+    [
+        (PMState(time_step=0, position=PLACE, velocity=0.0, velocity_y=0.0), "no orientation"),
+        (KSState(time_step=0, position=np.zeros(1), orientation=0.0, velocity=1.0), "it is x, y"),
+        (KSState(time_step=0, position=PLACE, orientation="north", velocity=1.0), "'north', which is no"),
+        (KSState(time_step=0, position=PLACE, orientation=0.0, velocity=np.ones(2)), "which is no number"),
+    ],
+    ids=["standing point mass", "one number", "word", "two speeds"],
+)
+def test_a_start_that_cannot_be_read_is_a_sentence(state, words):
+    with pytest.raises(ScenarioError, match=words):
+        initial_state_of(state)

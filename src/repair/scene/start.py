@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from repair.errors import ScenarioError
+from repair.errors import ScenarioError, in_words
 from repair.scene.scene import InitialState
 from repair.scene.traffic.shapes import FAR
 from repair.scene.traffic.timeline import STEPS_MAX
@@ -31,14 +32,22 @@ def initial_state_of(state: Any) -> InitialState:
     position = getattr(state, "position", None)
     if position is None or hasattr(position, "center") or hasattr(position, "shapes"):
         raise ScenarioError("the planning problem's initial position is not an exact point")
+    # A point mass has no orientation of its own, and its velocity is that along x alone.
+    point = "velocity_y" in vars(state) and "orientation" not in vars(state)
     for name in ("orientation", "velocity", "acceleration", "yaw_rate"):
         value = getattr(state, name, None)
         if value is not None and hasattr(value, "start"):
             value = (value.start + value.end) / 2.0
+        if name == "orientation" and point and state.velocity == state.velocity_y == 0.0:
+            value = None  # commonroad-io makes 0 of it
         if value is None and name in ("orientation", "velocity"):
             raise ScenarioError(f"the planning problem's initial state has no {name}")
-        values.append(0.0 if value is None else float(value))
-    numbers = [float(position[0]), float(position[1]), *values]
+        values.append(0.0 if value is None else _number(value, name))
+    if point:
+        values[1] = math.hypot(values[1], _number(state.velocity_y, "velocity_y"))
+    if np.shape(position) != (2,):
+        raise ScenarioError(f"the planning problem's initial position is {in_words(position)}; it is x, y")
+    numbers = [_number(position[0], "position"), _number(position[1], "position"), *values]
     if not np.isfinite(numbers).all():
         raise ScenarioError("the planning problem's initial state is not finite")
     made = InitialState(*numbers)
@@ -51,6 +60,15 @@ def initial_state_of(state: Any) -> InitialState:
             f"the ego's initial speed is {made.velocity:g} m/s; it has to be from 0 to {SPEED_RANGE[1]:g} m/s"
         )
     return made
+
+
+def _number(value: Any, name: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise ScenarioError(
+            f"{name} of the planning problem's initial state is {in_words(value)}, which is no number"
+        ) from error
 
 
 def first_step_of(state: Any) -> int:
