@@ -384,3 +384,15 @@ def test_limits_that_were_configured_are_moved_by_the_amount(tmp_path):
     usual = prepared(written(tmp_path, standing(30, 39.0, 0.0)))
     assert under(usual, "friction", 2.0).limits.a_min == pytest.approx(usual.limits.a_min - 2.0)
     assert replace(usual.limits) == usual.limits
+
+
+def test_what_a_bound_proves_an_explanation_does_not_leave_open(tmp_path):
+    # It drives off the road at once: the conflict is at 0 s, before which an explanation looks for no proof.
+    file = written(tmp_path, "", own=20.0)
+    start = state(20.0, 4.0, v=20.0, heading=1.2)
+    file.write_text(file.read_text().replace(state(20.0, 0.0, v=20.0), start), encoding="utf-8")
+    wanted = ["mitigation.wanted=true", "explain.wanted=true", "explain.kinds=[removed]", "fallback=[]", FEW]
+    result = repair.repair(file, overrides=["reference.source=constant", *wanted])
+    assert (result.status, result.ttc) == (SearchStatus.UNAVOIDABLE, 0.0)
+    assert result.explanation is not None
+    assert result.explanation.proven

@@ -70,4 +70,7 @@ def what_is_known(
     if config.explain.wanted:
         with timed("explain"):
             explanation = explain(prepared, found, on_progress=on_explaining)
+        # An explanation looks for small proofs only, and for none where the reference is in conflict at once.
+        if explanation is not None and any(one.time <= explanation.t_rep for one in bounds.values()):
+            explanation = replace(explanation, proven=True)
     return Known(certain(found, bounds), bounds, mitigation, explanation)
