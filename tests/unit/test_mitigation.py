@@ -10,6 +10,7 @@ import pytest
 import shapely
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from tests.roads import lanelet, problem, scenario, state
 from tests.unavoidable import KINDS, situation
 
 import repair
@@ -17,6 +18,7 @@ from repair.certify.recompute import certify
 from repair.cli import main
 from repair.errors import RepairError
 from repair.mitigation.settings import MitigationConfig
+from repair.report.birdseye import birdseye_figure
 from repair.search.result import SearchStatus
 
 GIVEN = ["reference.source=constant"]
@@ -211,6 +213,20 @@ def test_who_has_a_conflict_at_once_may_be_lost_as_well(tmp_path):
     found = result_of(tmp_path, situation("wall", 15.0, 0.8), "mitigation.wanted=true")
     assert found.ttc == 0.0
     assert found.status is SearchStatus.UNAVOIDABLE
+
+
+def test_who_leaves_the_road_at_once_has_no_way_to_draw(tmp_path):
+    road, beside = lanelet(1, range(0, 301, 10), [0.0] * 31), problem(100, state(20.0, 1.0, v=14.0))
+    situated = prepared(
+        tmp_path, scenario(road=road, obstacles="", problems=beside), "mitigation.wanted=true"
+    )
+    result = repair.repair(situated.scene, situated.config)
+    assert result.mitigation is not None
+    assert (result.mitigation.best.impact.kind, result.mitigation.best.impact.time) == ("off_road", 0.0)
+    drawing = result.outcome.drawing
+    assert "mitigation" not in [line.kind for line in drawing.lines]
+    assert all(np.isfinite(line.acceleration).all() for line in drawing.lines)
+    birdseye_figure(result.outcome)
 
 
 def test_what_is_written_and_printed(tmp_path, capsys):

@@ -126,6 +126,8 @@ def _after(
         curves.append(("mitigation", best.impact.kind, best.curve, end))
     lines = []
     for kind, name, curve, end in curves:
+        if end - curve.t_start < INSTANT:
+            continue  # what leaves the road at the very start has no way that could be drawn
         steps = max(math.ceil((end - curve.t_start) / prepared.scene.dt - STEP), 1)
         count = steps * prepared.checker.config.substeps
         samples = curve.sample(np.linspace(curve.t_start, end, count + 1))
