@@ -585,3 +585,28 @@ def test_every_format_names_its_files(found: RepairResult, tmp_path: Path) -> No
     assert {p.name for p in written} == {p.name for p in tmp_path.iterdir()}  # old.txt is gone
     assert load_result(tmp_path).record["text_file"] == name
     assert "text_file" not in found.saved(tmp_path, figure=False)[0].record
+
+
+def test_a_scenario_from_memory_need_not_say_who_made_it(
+    scenario_file: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    made = load_scene(scenario_file, CONFIG)
+    scenario = made.scenario
+    scenario.author = scenario.affiliation = scenario.source = scenario.tags = scenario.location = None
+    result = repair(scene_from_scenario(scenario, made.planning_problem, CONFIG), CONFIG)
+    assert result.status is SearchStatus.FOUND
+    result.save(tmp_path, figure=False)
+    assert not caplog.records
+    assert certify(tmp_path).ok
+
+
+def test_a_scenario_that_cannot_be_written_is_missed_with_the_reason(
+    found: RepairResult, tmp_path: Path
+) -> None:
+    found.save(tmp_path, figure=False)
+    file = tmp_path / "result.json"
+    record = json.loads(file.read_text())
+    record |= {"scenario_file": None, "scenario_file_problem": "writing the scenario failed: so it goes"}
+    file.write_text(json.dumps(record))
+    with pytest.raises(RepairError, match=r"does not hold the scenario .*: writing .* so it goes"):
+        certify(tmp_path)

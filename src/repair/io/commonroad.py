@@ -152,6 +152,7 @@ def scenario_bytes(scene: Scene) -> bytes:
     """
     from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
     from commonroad.planning.planning_problem import PlanningProblemSet
+    from commonroad.scenario.scenario import Location
 
     with (
         foreign("writing the scenario", OutputError),
@@ -161,6 +162,12 @@ def scenario_bytes(scene: Scene) -> bytes:
         warnings.simplefilter("ignore")
         file = Path(aside) / "scenario.xml"
         problems = PlanningProblemSet([scene.planning_problem])
-        writer = CommonRoadFileWriter(scene.scenario, problems, decimal_precision=_DIGITS)
+        scenario = scene.scenario
+        said = scenario.author, scenario.affiliation, scenario.source
+        # What a scenario from memory does not say of itself, commonroad-io asks for by bare assertions.
+        writer = CommonRoadFileWriter(
+            scenario, problems, *("" if words is None else words for words in said),
+            tags=scenario.tags or set(), location=scenario.location or Location(), decimal_precision=_DIGITS,
+        )  # fmt: skip
         writer.write_to_file(str(file), OverwriteExistingFile.ALWAYS)
         return file.read_bytes()

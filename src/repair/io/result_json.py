@@ -95,7 +95,12 @@ def scenario_of(folder: Path, content: Mapping[str, Any]) -> Path:
     """
     origin = content.get("provenance") or {}
     beside = content.get("scenario_file")
-    path = folder / beside if beside else Path(str(origin.get("path") or ""))
+    if not beside and not origin.get("path"):
+        why = content.get("scenario_file_problem")
+        raise RepairError(
+            f"{folder} does not hold the scenario that the result was made from" + (f": {why}" if why else "")
+        )
+    path = folder / beside if beside else Path(str(origin["path"]))
     if not path.is_file():
         raise RepairError(f"the scenario {path} of the result is not there any more")
     wanted = origin.get("sha256") or content.get("scenario_sha256")
