@@ -167,6 +167,15 @@ def slow_lead(scene, gap=15.0, speed=0.5):
     )
 
 
+@pytest.mark.parametrize("v, a", [(0.0, 0.0), (0.0, -1.0), (0.3, -2.0), (0.05, -0.5)])
+def test_who_stands_and_is_said_to_brake_does_not_roll_back(scene, v, a):
+    braking = replace(scene, start=frozen([scene.start[0], [v, 0.0], [a, 0.0]]))
+    curve = make_reference(braking, ReferenceConfig(), NOBODY)
+    speeds = curve.sample(np.arange(0.0, scene.horizon, 1e-3)).velocity[:, 0]
+    assert speeds.min() >= -1e-6
+    assert speeds[-1] > 2.0  # and it goes on
+
+
 def test_aware_planner_avoids_a_slow_lead_and_the_blind_one_does_not(scene):
     boxes = slow_lead(scene)
     blind = make_reference(scene, ReferenceConfig(), boxes)

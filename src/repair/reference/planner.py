@@ -32,6 +32,8 @@ __all__ = ["plan_speed"]
 
 _GRID_MAX = 2e8  # edges that the graph search may look at: a few seconds
 _JERK = 0.3  # weight of the jerk (m/s³) against the distance (m) to the searched profile
+_FINE = 0.01  # between looks at whether a curve reverses [s]
+_ROLLS = 1e-6  # slower than this backwards is rounding [m/s]
 _DISCOMFORT = 50.0  # per m/s² or m/s too much and second: far above what any progress can outweigh
 
 
@@ -207,10 +209,14 @@ def _smooth(profile: SpeedProfile, scene: Scene, duration: float) -> UniformBSpl
 def _by_steps(curve: UniformBSpline, scene: Scene) -> UniformBSpline | SpeedProfile:
     """The curve, or constant accelerations between its speeds at the steps where those cannot follow it.
 
-    A jerk j moves the end of a step by j dt³ / 12 from where its mean acceleration leads.
+    A jerk j moves the end of a step by j dt³ / 12 from where its mean acceleration leads. A curve that
+    reverses, as who stands and is said to brake would, is replaced by steps that stop instead.
     """
     jerk = float(np.abs(curve.derivative_points(3)[:, 0]).max())
-    if jerk * scene.dt**3 / 12.0 <= 0.5 * POSITION_TOLERANCE:
+    slowest = min(float(scene.start[1, 0]), 0.0)  # who rolls back at the start may go on with that
+    speeds = curve.sample(np.arange(0.0, curve.t_end, _FINE)).velocity[:, 0]
+    reverses = float(speeds.min()) < slowest - _ROLLS
+    if jerk * scene.dt**3 / 12.0 <= 0.5 * POSITION_TOLERANCE and not reverses:
         return curve
     count = max(intervals(curve.t_end, scene.dt), 1)
     speeds = np.maximum(curve.sample(np.arange(count + 1) * scene.dt).velocity[:, 0], 0.0)
