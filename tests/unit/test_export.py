@@ -23,7 +23,7 @@ from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
 from repair.curves.codec import curve_to_dict, read_curve
 from repair.errors import OutputError, RepairError
-from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
+from repair.io.commonroad import scenario_bytes, to_dynamic_obstacle, to_solution, to_trajectory
 from repair.io.result_json import read_record, to_json
 from repair.report.birdseye import birdseye_figure
 from repair.report.profiles import profile_figure, stages_figure
@@ -598,6 +598,22 @@ def test_a_scenario_from_memory_need_not_say_who_made_it(
     result.save(tmp_path, figure=False)
     assert not caplog.records
     assert certify(tmp_path).ok
+
+
+def test_a_scenario_from_memory_is_written_to_the_last_digit(scenario_file: Path, tmp_path: Path) -> None:
+    made = load_scene(scenario_file, CONFIG)
+    made.scenario.translate_rotate(np.array([0.1, 1e-7]), 0.7)
+    made.planning_problem.translate_rotate(np.array([0.1, 1e-7]), 0.7)
+    file = tmp_path / "scenario.xml"
+    file.write_bytes(scenario_bytes(scene_from_scenario(made.scenario, made.planning_problem, CONFIG)))
+    read = load_scene(file, CONFIG)
+    for one, other in zip(
+        made.scenario.lanelet_network.lanelets, read.scenario.lanelet_network.lanelets, strict=True
+    ):
+        np.testing.assert_array_equal(one.left_vertices, other.left_vertices)
+    for one, other in zip(made.scenario.dynamic_obstacles, read.scenario.dynamic_obstacles, strict=True):
+        ends = [o.prediction.trajectory.state_list[-1] for o in (one, other)]
+        np.testing.assert_array_equal(ends[0].position, ends[1].position)
 
 
 def test_a_scenario_that_cannot_be_written_is_missed_with_the_reason(

@@ -305,6 +305,21 @@ def tampered(told, what):
     return told
 
 
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_who_leaves_the_road_between_two_samples_is_certified(tmp_path, substeps):
+    road, ahead = lanelet(1, range(0, 41, 10), [0.0] * 5), problem(100, state(27.0, 0.0, v=20.0))
+    keys = "mitigation.wanted=true", "fallback=[]", "scene.horizon=2", f"checker.substeps={substeps}"
+    situated = prepared(tmp_path, scenario(road=road, obstacles="", problems=ahead), *keys)
+    result = repair.repair(situated.scene, situated.config)
+    assert result.mitigation is not None
+    assert result.mitigation.best.impact.kind == "off_road"
+    assert result.mitigation.best.impact.time > 0.0
+    result.save(tmp_path / "out", figure=False)
+    certificate = certify(tmp_path / "out")
+    assert any(row.name.endswith("the road is left") for row in certificate.rows)
+    assert certificate.ok
+
+
 def test_certified_and_not_when_tampered_with(tmp_path):
     found = result_of(
         tmp_path,

@@ -22,7 +22,7 @@ __all__ = [
     "to_solution", "to_trajectory",
 ]  # fmt: skip
 
-_DIGITS = 12  # of what is written of a scenario from memory
+_DIGITS = 40  # of a scenario from memory: all there are, so that the file says the same
 
 _TURN = 2.0 * math.pi
 

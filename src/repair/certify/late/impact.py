@@ -30,7 +30,7 @@ __all__ = ["impact_rows", "status_row"]
 _TIME = 8e-3  # by which an impact may come at another time: states against the curve, and a millisecond [s]
 _SPEED = 0.15  # by which its speed may differ: hard braking for that time [m/s]
 _CLEAR = 0.2  # nearer to the middle of the rear half, or slower, is too close to call [m], [m/s]
-_EDGE = 0.03  # the edge of the road is looked at in samples by who says when it is left [s]
+_EDGE = 0.03  # by which leaving the road may differ, or by what is between the samples that see it [s]
 
 
 def status_row(content: Mapping[str, Any], rows: Sequence[CertificateRow]) -> list[CertificateRow]:
@@ -147,8 +147,8 @@ def _rows(
     if road is None:
         return
     if ends == "off_road":
-        off = abs(since - time)
-        yield CertificateRow("the road is left", time, since, -off, off <= _EDGE, "sampled", "s")
+        off, apart = abs(since - time), max(_EDGE, dt / prepared.checker.config.substeps)
+        yield CertificateRow("the road is left", time, since, -off, off <= apart, "sampled", "s")
         yield from _own_rows(one, motion, time)
     else:
         until = min(time, float(motion.t[-1]))
