@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from repair.api import repair
 from repair.certify.certificate import Certificate, CertificateRow, format_certificate
+from repair.certify.limits import driven_rows
+from repair.certify.motion import Motion
 from repair.certify.recompute import certify
 from repair.cli.command import main
 from repair.errors import RepairError
 from repair.paper.bundled import paper_scenario
+from repair.problem.limits import Limits
 
 
 @pytest.fixture(scope="module")
@@ -209,3 +213,17 @@ def test_the_vehicle_is_driven_from_the_start(scenarios, tmp_path):
     repair(scenarios / "DEU_Lohmar-37_1_T-1.xml").save(tmp_path, figure=False)
     rows = {row.name: row for row in certify(tmp_path).rows}
     assert rows["first contact of the shapes"].ok
+
+
+@pytest.mark.parametrize("when, ok", [(0.0, True), (1.0, False)], ids=["standing", "driving"])
+def test_a_direction_may_jump_where_the_ego_stands_and_nowhere_else(when: float, ok: bool) -> None:
+    t = np.arange(0.0, 2.0, 1e-3)
+    speed = 0.5 * t
+    # Below 0.01 m/s the direction of the last motion is held.
+    heading = np.where(speed < max(0.5 * when, 0.01), 0.0, 0.4)
+    limits = Limits(v_max=20.0, v_lat=8.0, a_min=-8.0, a_max=8.0, a_lat=2.0, a_total=8.0, j_lon=60.0,
+                    j_lat=60.0, curvature=0.4)  # fmt: skip
+    motion = Motion(t, np.zeros((len(t), 3)), speed, heading)
+    rows = {row.name: row for row in driven_rows(motion, limits, limits, 0.0)}
+    assert rows["lateral acceleration"].ok is ok
+    assert rows["friction circle"].ok is ok
