@@ -8,19 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.arrays import Array, wrap
+from repair.arrays import Array
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import STANDSTILL
+from repair.scene.start import slip_at_start
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
-    from repair.scene.scene import Scene
 
 __all__ = ["Followed", "is_finite", "motion_of", "slip_at_start"]
-
-# The body begins as the planning problem has it where that of steady driving is off by more than the one and
-# less than the other [rad]; beyond, the path says something else about the start than the problem.
-_UNSTEADY, _STATED = 0.003, 0.03
 
 
 @dataclass(frozen=True)
@@ -70,22 +66,3 @@ def is_finite(path: CartesianPath) -> bool:
     if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
         return True
     return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))
-
-
-def slip_at_start(scene: Scene, path: CartesianPath) -> float | None:
-    """Slip angle at t = 0 where the body's orientation is known; None for that of steady driving.
-
-    It is where a reference states it, and where the vehicle stands: of a path that stands the direction is
-    held, so that it says nothing about the body's.
-    """
-    stated, begins = scene.first_heading, len(path.speed) > 0
-    if stated is not None and begins:
-        return float(wrap(path.heading[0] - stated))
-    body = scene.initial_state.orientation
-    if begins and abs(float(path.speed[0])) < STANDSTILL:
-        return float(wrap(path.heading[0] - body))
-    if len(path.speed) > 1:  # where a path begins in a bend that changes, no steady driving fits it
-        _, orientation = scene.model.angles(path, None)
-        if _UNSTEADY < abs(float(wrap(orientation[0] - body))) < _STATED:
-            return float(wrap(path.heading[0] - body))
-    return None

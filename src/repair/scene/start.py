@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from repair.arrays import wrap
+from repair.curves.plane import STANDSTILL
 from repair.errors import ScenarioError, in_words
 from repair.scene.scene import InitialState
 from repair.scene.traffic.shapes import FAR
 from repair.scene.traffic.timeline import STEPS_MAX
 from repair.vehicle.parameters import Vehicle
 
-__all__ = ["SPEED_RANGE", "first_step_of", "initial_state_of", "is_ego"]
+if TYPE_CHECKING:
+    from repair.curves.plane import CartesianPath
+    from repair.scene.scene import Scene
+
+__all__ = ["SPEED_RANGE", "first_step_of", "initial_state_of", "is_ego", "slip_at_start"]
 
 SPEED_RANGE = (-0.1, 100.0)
 """Initial speeds that can be dealt with [m/s]."""
+# The body begins as the planning problem has it where that of steady driving is off by more than the one and
+# less than the other [rad]; beyond, the path says something else about the start than the problem.
+_UNSTEADY, _STATED = 0.003, 0.03
+_CRAWLS, _NEAR = 1.0, 0.1  # [m/s], [rad]; from there a body comes to its path by steering of 0.1 rad/s
 
 
 def initial_state_of(state: Any) -> InitialState:
@@ -112,3 +122,25 @@ def is_ego(obstacle: Any, *, ego: InitialState, first_step: int, vehicle: Vehicl
     length = getattr(obstacle.obstacle_shape, "length", None)
     alike = length is None or abs(length - vehicle.length) < 2.0
     return bool(off < 0.5 and turned < 0.1 and faster < 1.0 and alike)
+
+
+def slip_at_start(scene: Scene, path: CartesianPath) -> float | None:
+    """Slip angle at t = 0 where the body's orientation is known; None for that of steady driving.
+
+    It is where a reference states it, and where the vehicle stands: of a path that stands the direction is
+    held, so that it says nothing about the body's. Where it crawls along its body, the bends of the path,
+    which are of centimetres then, say no more of it.
+    """
+    if not len(path.speed):
+        return None
+    if scene.first_heading is not None:
+        return float(wrap(path.heading[0] - scene.first_heading))
+    body, pace = scene.initial_state.orientation, abs(float(path.speed[0]))
+    off = float(wrap(path.heading[0] - body))
+    if pace < STANDSTILL or (pace < _CRAWLS and abs(off) < _NEAR):
+        return off
+    if len(path.speed) > 1:  # where a path begins in a bend that changes, no steady driving fits it
+        _, orientation = scene.model.angles(path, None)
+        if _UNSTEADY < abs(float(wrap(orientation[0] - body))) < _STATED:
+            return off
+    return None
