@@ -293,3 +293,40 @@ def test_a_short_reference_holds_until_its_end(drive, scene):
     assert found.prepared.t_reference == pytest.approx(1.0)
     assert found.to_dict()["checked_until_s"] == pytest.approx(1.0)
     assert any("ends at 1 s" in note for note in found.to_dict()["notes"])
+
+
+@pytest.mark.parametrize("backend", ["ego", "casadi"])
+def test_a_repair_that_brakes_late_is_followed_as_it_is(backend, tmp_path):
+    """A smoothing spline swings around the jump of its acceleration, by more than the tyres hold."""
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    wall, start = (
+        roads.driving(30, 62.0, 0.0, 0.0, range(1, 61)),
+        roads.problem(100, roads.state(20.0, 0.0, v=9.0)),
+    )
+    file.write_text(roads.scenario(obstacles=wall, problems=start), encoding="utf-8")
+    scene = repair.load_scene(file)
+    keys = ["reference.source=constant", "repair.lateral=none", "fallback=[]", "search.delta_t=0.2"]
+    found = repair.repair(scene, backend=backend, overrides=keys)
+    assert found.peaks.min_acceleration < -10.0
+    again = repair.prepare(scene, repair.load_config(), reference=found.states)
+    assert again.conflict.kind == "none"
+
+
+@pytest.mark.parametrize("speed", [0.012, 0.1, 0.4])
+def test_who_crawls_stands_as_the_plan_says(speed, tmp_path):
+    """The bends of a path of centimetres would turn the body by more than a radian."""
+    line = roads.bend(40.0, 80.0)
+    x, y = line[5]
+    start = roads.state(x, y + 0.2, v=speed, heading=0.22)
+    road, far = roads.strip(1, line), roads.driving(30, 900.0, 300.0, 1.0)
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(
+        roads.scenario(road=road, obstacles=far, problems=roads.problem(100, start)), encoding="utf-8"
+    )
+    scene = repair.load_scene(file)
+    planned = repair.prepare(scene, repair.load_config(overrides=["reference.source=accelerate"]))
+    plan = table(planned.checker.drive(planned.reference, planned.t_reference))
+    given = repair.prepare(scene, repair.load_config(), reference=plan)
+    driven = given.checker.drive(given.reference, given.t_reference)
+    assert given.conflict.kind == "none"
+    assert driven.orientation[0] == pytest.approx(0.22, abs=1e-9)

@@ -15,6 +15,7 @@ from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import splice_points
 from repair.errors import ReferenceTrajectoryError
 from repair.scene.road.passes import along
+from repair.scene.start import slip_at_start
 
 if TYPE_CHECKING:
     from repair.reference.consistency import Recording
@@ -40,7 +41,8 @@ def fit_recording(
     which is exact for constant accelerations. Where the vehicle cannot follow that, because the states were
     rounded or are those of another model, and wherever only positions are known, it is a smoothing spline
     that starts with the scene's state, or with the recording's own speed where that differs; its knots are
-    spread over the recording's own duration.
+    spread over the recording's own duration. Where the vehicle cannot follow the spline either, since it
+    swings around a jump of the acceleration, and can follow what speeds and headings say, it is that.
 
     Parameters
     ----------
@@ -68,10 +70,16 @@ def fit_recording(
             f"{what} leaves the neighbourhood of the route and cannot be a reference"
         )
     if recording.velocities is None:
-        return _smooth(scene, recording, coordinates, noisy=noisy)[0]
-    exact = BernsteinCurve.hermite(
-        0.0, scene.dt, coordinates, _in_frame(scene, coordinates, recording.velocities)
-    )
+        smooth = _smooth(scene, recording, coordinates, noisy=noisy)[0]
+        if (
+            noisy
+            or not _swings(scene, smooth)
+            or not np.isfinite([recording.speeds, recording.headings]).all()
+        ):
+            return smooth
+        exact = _hermite(scene, coordinates, _by_the_body(recording, scene.dt))
+        return exact if _drivable_until(scene, exact) > _drivable_until(scene, smooth) else smooth
+    exact = _hermite(scene, coordinates, recording.velocities)
     first = _drivable_until(scene, exact)
     rough = _roughness(exact) > _ROUGH
     if rough or np.isfinite(first):
@@ -80,6 +88,25 @@ def fit_recording(
         if then > first or (rough and then == first):
             return smooth
     return exact
+
+
+def _hermite(scene: Scene, coordinates: Array, velocities: Array) -> BernsteinCurve:
+    """The curve through coordinates and velocities (K, 2), cubic from step to step."""
+    return BernsteinCurve.hermite(0.0, scene.dt, coordinates, _in_frame(scene, coordinates, velocities))
+
+
+def _swings(scene: Scene, smooth: UniformBSpline) -> bool:
+    """Whether a spline may need more grip along the path than there is, as it does around a jump of it."""
+    return bool(np.abs(smooth.derivative_points(2)[:, 0]).max() > scene.vehicle.a_max)
+
+
+def _by_the_body(recording: Recording, dt: float) -> Array:
+    """Velocities (K, 2) of the centre [m/s], by the speed, heading and turning of the body."""
+    heading = np.unwrap(recording.headings)
+    across = recording.rear * np.gradient(heading, dt)
+    cos, sin = np.cos(heading), np.sin(heading)
+    x, y = recording.speeds * cos - across * sin, recording.speeds * sin + across * cos
+    return np.stack([x, y], axis=1)
 
 
 def _roughness(exact: BernsteinCurve) -> float:
@@ -132,13 +159,8 @@ def _orientation(scene: Scene, curve: Curve, count: int) -> Array:
     """Of the body that drives along a curve, at the steps (count,) [rad]."""
     times = np.arange((count - 1) * _PARTS + 1) * (scene.dt / _PARTS)
     path = scene.frame.cartesian(curve.sample(times))
-    _, orientation = scene.model.angles(path, _first_slip(scene, float(path.heading[0])))
+    _, orientation = scene.model.angles(path, slip_at_start(scene, path))
     return orientation[::_PARTS]
-
-
-def _first_slip(scene: Scene, heading: float) -> float | None:
-    known = scene.first_heading
-    return None if known is None else float(wrap(heading - known))
 
 
 def _drivable_until(scene: Scene, curve: Curve) -> float:
@@ -146,7 +168,7 @@ def _drivable_until(scene: Scene, curve: Curve) -> float:
     steps = round((curve.t_end - curve.t_start) / scene.dt)
     times = np.arange(steps * _PARTS + 1) * (scene.dt / _PARTS)
     path = scene.frame.cartesian(curve.sample(times))
-    slip, orientation = scene.model.angles(path, _first_slip(scene, float(path.heading[0])))
+    slip, orientation = scene.model.angles(path, slip_at_start(scene, path))
     found = scene.model.first_undrivable(
         times[::_PARTS], path.xy[::_PARTS], path.speed[::_PARTS], slip[::_PARTS], orientation[::_PARTS],
         scene.dt, "leftover", np.inf,
