@@ -330,3 +330,16 @@ def test_who_crawls_stands_as_the_plan_says(speed, tmp_path):
     driven = given.checker.drive(given.reference, given.t_reference)
     assert given.conflict.kind == "none"
     assert driven.orientation[0] == pytest.approx(0.22, abs=1e-9)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+def test_who_is_said_to_brake_at_rest_does_not_roll_back(speed, tmp_path):
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    start = roads.problem(100, roads.state(20.0, 0.0, v=speed, acceleration=-1.5))
+    file.write_text(roads.scenario(problems=start), encoding="utf-8")
+    scene = repair.load_scene(file)
+    t = np.arange(0.0, 3.01, 0.1)
+    plan = np.column_stack([t, 20.0 + speed * t, 0.0 * t, 0.0 * t, speed + 0.0 * t])
+    given = repair.prepare(scene, repair.load_config(), reference=plan)
+    driven = given.checker.drive(given.reference, given.t_reference)
+    assert driven.speed.min() >= speed - 1e-3

@@ -192,7 +192,9 @@ def _smooth(
     elif abs(own - state[1, 0]) > _SPEED_OFF:
         state[1, 0] = own
     spacing = max(_SPACING, 2.0 * scene.dt)
-    best, off = _fitted(coordinates, state, scene.dt, spacing)
+    # Who is said to brake and would stop within a knot need not do so: the positions say how it goes on.
+    stops = state[1, 0] + min(state[2, 0], 0.0) * spacing < min(state[1, 0], 0.0)
+    best, off = _fitted(coordinates, state[:2] if stops else state, scene.dt, spacing)
     for finer, fixed in ((spacing, 2), (0.5 * spacing, 2)):
         if noisy or off <= _FIT_OFF:
             break
