@@ -69,7 +69,8 @@ def searched(checker, source=None, backend=None, **settings):
         ({Reason.OFF_ROAD: 0.2}, [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.3, 0.0)]),
         ({Reason.LIMITS: 0.05}, [(0.0, 0.0, 0.0), (0.0, 0.0, 0.05)]),
         ({Reason.KINEMATICS: 0.1}, [(0.0, 0.0, 0.0), (0.0, 0.0, 0.05), (0.0, 0.0, 0.1)]),
-        ({Reason.COLLISION: 0.3, Reason.LIMITS: 0.1}, [(0.0, 0.0, 0.0), (0.3, 0.0, 0.05), (0.3, 0.0, 0.1)]),
+        ({Reason.OFF_ROAD: 0.1, Reason.LIMITS: 0.1}, [(0.0, 0.0, 0.0), (0.0, 0.1, 0.05), (0.0, 0.1, 0.1)]),
+        ({Reason.COLLISION: 0.3, Reason.OFF_ROAD: 0.3}, [(0.0, 0.0, 0.0), (0.3, 0.1, 0.0), (0.3, 0.3, 0.0)]),
     ],
 )
 def test_what_was_missed_is_tightened_notch_by_notch(needs, seen):
@@ -82,7 +83,14 @@ def test_what_was_missed_is_tightened_notch_by_notch(needs, seen):
 
 @pytest.mark.parametrize(
     "needs, visits",
-    [({Reason.MARGIN: 9.0}, 3), ({Reason.OFF_ROAD: 9.0}, 4), ({Reason.CHECKER_ERROR: 1.0}, 1)],
+    [
+        ({Reason.MARGIN: 9.0}, 3),
+        ({Reason.OFF_ROAD: 9.0}, 4),
+        ({Reason.CHECKER_ERROR: 1.0}, 1),
+        # More room would cost more of the limits, which are exceeded already.
+        ({Reason.MARGIN: 0.3, Reason.LIMITS: 0.05}, 1),
+        ({Reason.COLLISION: 0.3, Reason.KINEMATICS: 0.05}, 1),
+    ],
 )
 def test_it_ends_where_no_notch_is_left_or_none_would_help(needs, visits):
     checker = Demanding(needs)

@@ -33,6 +33,10 @@ class Notches(NamedTuple):
         missed = {violation.reason for violation in verdict.violations}
         return Notches(*(k + any(r in missed for r in why) for k, why in zip(self, _ANSWERS, strict=True)))
 
+    def torn(self, before: Notches) -> bool:
+        """Room and limits are both missed since some notches before: more of the one costs the other."""
+        return self.room > before.room and self.ease > before.ease
+
     def amounts(self, lists: Sequence[Sequence[float]]) -> tuple[float, ...] | None:
         """Metres of room and of road, and the share of the limits; None where a list has no such notch."""
         if any(k > len(notches) for k, notches in zip(self, lists, strict=True)):
@@ -50,9 +54,10 @@ def probe_again(
     """Tighten side after side by what the checker missed, again and again, until one passes.
 
     Backends see boxes and single points of the curve, soft ones may exceed each of them a little; the checker
-    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room. The
-    first side that passes is the answer, whatever ``search.sides`` says: costs of problems that were
-    tightened differently say little about which is better.
+    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room. It has
+    none where a curve comes too close and exceeds the limits: such a side is given up. The first side that
+    passes is the answer, whatever ``search.sides`` says: costs of problems that were tightened differently
+    say little about which is better.
 
     Parameters
     ----------
@@ -72,7 +77,7 @@ def probe_again(
         while not verdict.ok:
             further = taken.after(verdict)
             amounts = further.amounts(source.notches)
-            if further == taken or amounts is None:
+            if further == taken or amounts is None or further.torn(taken):
                 break
             if budget.spent:
                 budget.cut = True
