@@ -116,7 +116,9 @@ def test_the_first_of_the_tightened_sides_that_passes_is_taken():
 
 def test_larger_margins_may_show_another_way():
     source = Tightening(
-        (Maneuver.GO_AHEAD,), wider=((Maneuver.GO_AHEAD,), (Maneuver.YIELD, Maneuver.GO_AHEAD))
+        (Maneuver.GO_AHEAD,),
+        wider=((Maneuver.GO_AHEAD,), (Maneuver.YIELD, Maneuver.GO_AHEAD)),
+        open_until=-1.0,
     )
 
     class OnlyYield:
@@ -125,6 +127,9 @@ def test_larger_margins_may_show_another_way():
             return Verdict() if found else Verdict((Violation(Reason.MARGIN, 0.0),))
 
     assert searched(OnlyYield(), source).probes[0].maneuver is Maneuver.YIELD
+    # Larger boxes open no way: where all that were asked for are open, no other one comes closest.
+    shut = searched(OnlyYield(), replace(source, open_until=9.0))
+    assert shut.status is SearchStatus.NONE_FEASIBLE
     (only,) = other_ways(source.at(0.0), source.widened(0.0))
     assert [p.passing.maneuver for p in only] == [Maneuver.YIELD]
     assert too_close([(only[0], Verdict((Violation(Reason.MARGIN, 0.0),)))])

@@ -104,9 +104,10 @@ def until(latest):
 
 
 def search(
-    checker, ttc=2.9, *, backend=None, source=None, on_probe=None, clock=None, conflict=None, **settings
-):
-    keys = {"on_probe": on_probe} | ({"clock": clock} if clock else {})
+    checker, ttc=2.9, *, backend=None, source=None, on_probe=None, clock=None, conflict=None, visits=None,
+    **settings,
+):  # fmt: skip
+    keys = {"on_probe": on_probe, "visits": visits} | ({"clock": clock} if clock else {})
     return search_f_ttr(
         source or FakeSource(),
         conflict or Conflict(ttc, "margin", 7, ttc + 0.05),
@@ -379,6 +380,33 @@ def test_first_stops_at_the_first_feasible_side():
     result = search(until(9.0), source=FakeSource(BOTH), backend=backend, upper=0.0, sides="first")
     assert result.probes[0].maneuver is Maneuver.YIELD
     assert len(backend.limits) == 1
+
+
+def test_sides_are_compared_at_the_last_feasible_time_alone():
+    """Elsewhere one that passes is enough; what is found is what asking all of them everywhere finds."""
+    costs = {Maneuver.YIELD: 5.0, Maneuver.LEFT: 2.0, Maneuver.GO_AHEAD: 1.0}
+    backend, reported = FakeBackend(costs=costs), []
+    result = search(
+        until(1.0), source=FakeSource(BOTH), backend=backend, rule="scan", on_probe=reported.append
+    )
+    assert [len(probe.tried) for probe in result.probes if probe.feasible] == [1, 1, 3]
+    assert result.best.maneuver is Maneuver.GO_AHEAD
+    assert result.best.t_rep == result.f_ttr == pytest.approx(0.8)
+    assert result.curve is result.best.solve.curve
+    assert [probe.t_rep for probe in reported] == [probe.t_rep for probe in result.probes]
+    # Times that are given are looked at whole.
+    given = search(until(9.0), source=FakeSource(BOTH), backend=backend, visits=[0.0, 0.4])
+    assert [len(probe.tried) for probe in given.probes] == [3, 3]
+
+
+def test_a_side_that_is_compared_keeps_to_the_time_limit():
+    clock = BentClock()
+    backend = FakeBackend(on_solve=lambda: clock.tick(1.0))
+    result = search(
+        until(9.0), source=FakeSource(BOTH), backend=backend, clock=clock, time_limit=1.5, upper=0.0
+    )
+    assert result.complete
+    assert len(result.probes[0].tried) == 2
 
 
 def test_of_failures_the_first_is_kept():

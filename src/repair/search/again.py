@@ -54,10 +54,10 @@ def probe_again(
     """Tighten side after side by what the checker missed, again and again, until one passes.
 
     Backends see boxes and single points of the curve, soft ones may exceed each of them a little; the checker
-    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room. It has
-    none where a curve comes too close and exceeds the limits: such a side is given up. The first side that
-    passes is the answer, whatever ``search.sides`` says: costs of problems that were tightened differently
-    say little about which is better.
+    sees the vehicle, at all times. What is missed is mostly little, and elsewhere the optimum has room. It
+    has none where a curve comes too close and exceeds the limits: such a side is given up. The first side
+    that passes is the answer, whatever ``search.sides`` says: costs of problems that were tightened
+    differently say little about which is better.
 
     Parameters
     ----------

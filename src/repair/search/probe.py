@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from repair.backend.base import RepairBackend, SolveResult, SolveStatus
@@ -94,6 +94,8 @@ class Budget:
     # whether it is proven that nothing is feasible at a t_rep
     hopeless: Hopeless | None = None
     cut: bool = False  # the last probe would have gone on, had there been time
+    # the sides of feasible t_rep that nobody was asked for yet, as another one had passed
+    unasked: dict[float, Sequence[RepairProblem]] = field(default_factory=dict)
 
     @property
     def left(self) -> float | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from repair.backend.base import RepairBackend
 from repair.check.verdict import Conflict, Reason
@@ -21,6 +22,8 @@ from repair.search.probe import (
     Hopeless,
     ProblemSource,
     TrajectoryChecker,
+    better,
+    probe_sides,
 )
 from repair.search.result import Probe, SearchResult, SearchStatus
 from repair.search.rules import CONTIGUOUS, IsOpen, Order, from_the_end, probe_order
@@ -40,25 +43,25 @@ def iter_probes(
     checker: TrajectoryChecker,
     end: float,
     settings: SearchConfig,
-    clock: Callable[[], float] = time.perf_counter,
+    budget: Budget,
     visits: Sequence[float] | None = None,
     after: Probe | None = None,
-    hopeless: Hopeless | None = None,
 ) -> Iterator[Probe]:
     """Visit t_rep after t_rep as the rule says, until it ends or the time limit is reached.
+
+    Which repair of a t_rep is the best matters at the last one alone. While a rule looks for that, no side is
+    asked after one that passes; ``budget.unasked`` keeps them.
 
     Parameters
     ----------
     end : float
         Upper end of the search [s], excluded: the reference is in conflict there.
+    budget : Budget
     visits : sequence of float, optional
         The t_rep to visit [s] instead, whatever comes out.
     after : Probe, optional
         A feasible one: later t_rep are visited only, and its curve is where to start from.
-    hopeless : Hopeless, optional
-        Says of a t_rep whether it is proven that nothing is feasible there.
     """
-    budget = Budget(settings.time_limit, clock(), clock, hopeless if settings.proofs else None)
     made: dict[float, Sequence[RepairProblem]] = {}  # for the rule's questions; a probe takes them over
 
     def is_open(t_rep: float) -> bool:
@@ -76,6 +79,7 @@ def iter_probes(
     warm_start: Curve | None = None
     if after is not None and backend.capabilities.uses_warm_start:
         warm_start = after.solve.curve
+    sides = "first" if given is None else settings.sides
     answer: bool | None = None
     while True:
         try:
@@ -86,7 +90,11 @@ def iter_probes(
             raise OutOfTime
         with budget.watched():
             first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
-            probe = visit(t_rep, first, source, backend, checker, settings.sides, warm_start, budget)
+            probe = visit(
+                t_rep, first, source, backend, checker, settings.sides, warm_start, budget, at_first=sides
+            )
+        if probe.feasible and sides != settings.sides:
+            budget.unasked[t_rep] = first[len(probe.tried) :]
         if probe.feasible and backend.capabilities.uses_warm_start:
             warm_start = probe.solve.curve
         answer = probe.feasible or _says_nothing_of_later_ones(probe)
@@ -169,7 +177,8 @@ def search_f_ttr(
         The times-to-repair to try [s], instead of those of ``settings.rule``: the paper's baseline tries
         one, the TTR.
     on_probe : callable, optional
-        Called after every probe; an interrupt in between loses nothing that was found.
+        Called after every probe; an interrupt in between loses nothing that was found. Sides that the last
+        feasible one is compared with at the end are asked after that.
     after : Probe, optional
         A feasible one: only later t_rep are visited, and its curve is where to start from.
     hopeless : Hopeless, optional
@@ -193,8 +202,9 @@ def search_f_ttr(
         end = min(end, max(settings.upper, settings.delta_t * 1e-3))
     probes: list[Probe] = []
     complete = True
+    budget = Budget(settings.time_limit, begin, clock, hopeless if settings.proofs else None)
     try:
-        for probe in iter_probes(source, backend, checker, end, settings, clock, visits, after, hopeless):
+        for probe in iter_probes(source, backend, checker, end, settings, budget, visits, after):
             probes.append(probe)
             _LOG.debug(
                 "t_rep %g s: %s (%s)", probe.t_rep,
@@ -203,6 +213,8 @@ def search_f_ttr(
             )  # fmt: skip
             if on_probe is not None:
                 on_probe(probe)
+        if budget.unasked:
+            _compare(probes, backend, checker, budget)
     except (OutOfTime, KeyboardInterrupt):
         complete = False
     feasible = [p for p in probes if p.feasible]
@@ -215,3 +227,16 @@ def search_f_ttr(
         )
     status = SearchStatus.NONE_FEASIBLE if complete else SearchStatus.BUDGET_EXHAUSTED
     return SearchResult(status, conflict, None, None, tuple(probes), complete, wall)
+
+
+def _compare(probes: list[Probe], backend: RepairBackend, checker: TrajectoryChecker, budget: Budget) -> None:
+    """Ask the last feasible t_rep for the sides that are left, and keep the best of them all."""
+    k, last = max(((k, p) for k, p in enumerate(probes) if p.feasible), key=lambda one: one[1].t_rep)
+    left = budget.unasked[last.t_rep]
+    if not left or budget.spent:
+        return
+    warm_start = last.solve.curve if backend.capabilities.uses_warm_start else None
+    with budget.watched():
+        others, _ = probe_sides(last.t_rep, left, backend, checker, "best", warm_start, budget)
+    best = others if better(others, last) else last
+    probes[k] = replace(best, tried=(*last.tried, *others.tried))

@@ -217,7 +217,9 @@ def _search_with(
         limit = _left(settings, begin)
         upper = end if settings.upper is None else min(end, settings.upper)
         now = replace(settings, time_limit=limit, upper=upper if math.isfinite(upper) else None)
+        before = len(probes)
         found = ask(each, member, now, best)
+        probes[before:] = [replace(probe, by=each) for probe in found.probes]  # compared at its end
         refused[each] = {probe.t_rep for probe in found.probes if not probe.feasible}
         if found.status in (SearchStatus.NO_CONFLICT, SearchStatus.ALREADY_COLLIDING):
             return found

@@ -28,10 +28,14 @@ def visit(
     sides: str,
     warm_start: Curve | None,
     budget: Budget,
+    at_first: str = "",
 ) -> Probe:
-    """One t_rep, with its first problems and then with other margins."""
+    """One t_rep, with its first problems and then with other margins.
+
+    ``at_first`` is what counts instead of ``sides`` for the first problems.
+    """
     budget.cut = False
-    probe, rejected = probe_sides(t_rep, first, backend, checker, sides, warm_start, budget)
+    probe, rejected = probe_sides(t_rep, first, backend, checker, at_first or sides, warm_start, budget)
     if probe.feasible:
         return probe
     if (backend.capabilities.relaxes or backend.capabilities.helpers) and _hopeless(t_rep, budget):
@@ -52,7 +56,7 @@ def visit(
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
     others: list[Iterable[Sequence[RepairProblem]]] = []
-    if tightens and too_close(rejected):
+    if tightens and too_close(rejected) and _any_shut(first):
         others.append(other_ways(first, source.widened(t_rep)))
     if backend.capabilities.relaxes and not nobody:
         others.append(source.relaxed(t_rep))
@@ -69,6 +73,11 @@ def visit(
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
+
+
+def _any_shut(first: Sequence[RepairProblem]) -> bool:
+    """Whether a way was asked for that is not open; larger boxes open none, but may bring another closer."""
+    return any(problem.passing is not None and not problem.passing.open for problem in first)
 
 
 def _hopeless(t_rep: float, budget: Budget) -> bool:
