@@ -74,8 +74,9 @@ def test_a_backend(path):
 
     repair.register_backend("lazy", Lazy, settings=LazyConfig)
     result = repair.repair(
-        path, backend="lazy", overrides=["lazy.share=0.25", "reference.source=constant", "fallback=[]"]
-    )
+        path, backend="lazy",
+        overrides=["lazy.share=0.25", "reference.source=constant", "fallback=[]", "search.rule=bisect"],
+    )  # fmt: skip
     assert result.status is repair.SearchStatus.NONE_FEASIBLE
     assert result.search.probes[0].solve.detail == "share 0.25"
     assert asked == [(0.0, None)] * len(asked)

@@ -385,7 +385,8 @@ def test_places_and_amounts_are_printed(path):
     }  # fmt: skip
     lines = summary(record, None).splitlines()
     assert "the reference leaves the road (0.05 m² beside the road at (3.0, 4.0))" in line(lines, "TTC")
-    assert "  0.00 s: off_road at 1.00 s: 0.2 m² beside the road at (5.0, 6.0)" in lines
+    when = record["probes"][0]["t_rep_s"]
+    assert f"  {when:.2f} s: off_road at 1.00 s: 0.2 m² beside the road at (5.0, 6.0)" in lines
 
 
 def test_a_result_shows_itself_on_one_screen(scenarios):

@@ -84,7 +84,7 @@ class Until:
 
 def search(backend, source=None, latest=1.2, **keys):
     conflict = Conflict(2.9, "margin", 7, 2.95)
-    settings = SearchConfig(delta_t=0.4, **keys)
+    settings = SearchConfig(delta_t=0.4, rule="bisect", **keys)
     return search_f_ttr(source or Source(), conflict, backend, Until(latest), settings)
 
 

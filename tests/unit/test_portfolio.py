@@ -365,6 +365,6 @@ def test_a_violation_of_one_member_does_not_end_the_search():
     )
     one, two = Member("one", 9.0), Member("two", 9.0)
     whole = SimpleNamespace(capabilities=Capabilities(members=lambda: {"one": one, "two": two}))
-    found = search_with(whole, "portfolio", situation, SearchConfig(delta_t=STEP))
+    found = search_with(whole, "portfolio", situation, SearchConfig(delta_t=STEP, rule="bisect"))
     assert found.f_ttr == pytest.approx(0.3)
     assert two.asked == [pytest.approx(0.4)]

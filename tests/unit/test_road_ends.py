@@ -71,7 +71,7 @@ def test_a_lane_that_ends_beside_one_that_goes_on(tmp_path: Path, backend: str, 
                         more='<adjacentRight ref="1" drivingDir="same"/>')  # fmt: skip
     road += roads.strip(3, straight(60.0, 300.0, 4.0), before=[2])
     car = roads.car(30, roads.state(60.0, 4.0, v=0.0)) if closed else AWAY
-    found = answer(loaded(tmp_path, road, 22.0, 6.0, obstacles=car), backend)
+    found = answer(loaded(tmp_path, road, 22.0, 6.0, obstacles=car), backend, "search.rule=scan")
     assert found.status.value == "found"
     kinds = {p.maneuver.value for p in found.search.probes if p.feasible}
     if backend != "qptr":  # the baseline drives up to the far edge of the road, and touches it

@@ -20,8 +20,9 @@ class SearchConfig:
     """Algorithm 1."""
 
     rule: str = setting(
-        "bisect",
-        "guided: fewer probes; scan: every one; as_printed: to the letter",
+        "guided",
+        "guided: from the last open way past the obstacles on; bisect: the paper's; scan: every one; "
+        "as_printed: to the letter",
         registry="search rule",
         only_with=("driver", ("f_ttr",)),
     )
