@@ -332,6 +332,51 @@ def test_who_crawls_stands_as_the_plan_says(speed, tmp_path):
     assert driven.orientation[0] == pytest.approx(0.22, abs=1e-9)
 
 
+@pytest.fixture(scope="module")
+def askew(tmp_path_factory):
+    """Return a scene whose ego is beside the line of a bend and turned, and what is driven from there."""
+    line = roads.bend(40.0, 80.0)
+    (x, y), heading = line[5], float(np.arctan2(*(line[6] - line[4])[::-1]))
+    start = roads.state(x, y + 0.3, v=6.0, heading=heading + 0.05)
+    road, far = roads.strip(1, line), roads.driving(30, 900.0, 300.0, 1.0)
+    file = tmp_path_factory.mktemp("askew") / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(
+        roads.scenario(road=road, obstacles=far, problems=roads.problem(100, start)), encoding="utf-8"
+    )
+    scene = repair.load_scene(file)
+    planned = repair.prepare(scene, repair.load_config(overrides=["reference.source=constant"]))
+    return scene, planned.checker.drive(planned.reference, planned.t_reference)
+
+
+@pytest.mark.parametrize(
+    "form", ["t, x, y, yaw", "t, x, y, yaw, v", "at other times", "driven states", "a trajectory"]
+)
+def test_a_body_begins_as_it_is_said(form, askew):
+    scene, drive = askew
+    given = repair.prepare(scene, repair.load_config(), reference=FORMS[form](drive, scene))
+    driven = given.checker.drive(given.reference, given.t_reference)
+    assert given.conflict.kind == "none"
+    assert driven.orientation[0] == pytest.approx(scene.initial_state.orientation, abs=1e-9)
+    off = driven.orientation - drive.orientation[: len(driven)]
+    assert np.abs(off).max() < 0.02
+
+
+def test_a_cycle_begins_with_the_body_too(askew):
+    scene, drive = askew
+    watch = repair.Repairer(scene, backend="ego")
+    for _ in range(2):  # in a frame of its own, and in the kept one
+        cycle = watch.update(table(drive))
+        assert cycle.states.orientation[0] == pytest.approx(scene.initial_state.orientation, abs=1e-9)
+
+
+def test_headings_of_the_path_say_nothing_about_the_body(askew):
+    scene, drive = askew
+    plan = table(drive.every(4))
+    plan[:, 3] = np.unwrap(np.arctan2(*np.gradient(plan[:, 1:3], axis=0).T[::-1]))
+    assert given_reference(plan, scene).heading is None
+    assert given_reference(drive, scene).heading == pytest.approx(scene.initial_state.orientation, abs=1e-9)
+
+
 @pytest.mark.parametrize("speed", [0.0, 0.3])
 def test_who_is_said_to_brake_at_rest_does_not_roll_back(speed, tmp_path):
     file = tmp_path / "ZAM_Test-1_1_T-1.xml"

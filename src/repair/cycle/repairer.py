@@ -300,7 +300,7 @@ class Repairer:
             if fits(places, kept.frame.length, self._room):
                 if len(passes(kept.frame)) == 1:  # else where it is there depends on the way
                     given = replace(given, places=(kept.frame, places))
-                return in_frame(kept, scene, places[0]), given, self._checker
+                return in_frame(kept, scene, places[0], given.heading), given, self._checker
             rebuilt.append("frame: the plan leaves the path of the last one")
         if not self._within(positions):
             self.scene = moved_on(self._first, scene.initial_state)
@@ -312,7 +312,7 @@ class Repairer:
             )  # fmt: skip
         if self._lanes is None:
             self._lanes = lanes_at(scene)
-        made = reframe(scene, positions, lanes=self._lanes)
+        made = reframe(scene, positions, given.heading, self._lanes)
         self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
         self._framed, self._kept = made, None
         return made, given, self._checker

@@ -103,10 +103,11 @@ def fits(places: Array, length: float, room: float) -> bool:
     )
 
 
-def in_frame(kept: Scene, scene: Scene, place: Array) -> Scene:
-    """The scene of this cycle in the frame of another one."""
+def in_frame(kept: Scene, scene: Scene, place: Array, heading: float | None) -> Scene:
+    """The scene of this cycle in the frame of another one; ``heading`` of the body [rad], where known."""
     start = frozen([place, scene.start[1], scene.start[2]])
     return replace(
         scene, frame=kept.frame, start=start, route_end_s=kept.route_end_s, goal_s=kept.goal_s,
         lane=kept.lane, same_direction=kept.same_direction, road=kept.road, speed_limit=kept.speed_limit,
+        first_heading=heading,
     )  # fmt: skip

@@ -26,6 +26,7 @@ __all__ = [
     "START_OFF",
     "START_SPEED_OFF",
     "Recording",
+    "are_of_the_body",
     "require_consistent",
     "require_start",
     "require_turns",
@@ -134,6 +135,18 @@ def require_consistent(recording: Recording, dt: float, vehicle: Vehicle | None 
         _turns(recording, dt, vehicle)
     _directions(recording, dt, vehicle)
     _speeds(recording, dt, vehicle.a_max)
+
+
+def are_of_the_body(recording: Recording) -> bool:
+    """Whether headings (K,) are rather those of the body than directions of the centre's path.
+
+    The rear axle follows the one, the centre the other; where neither turns both hold.
+    """
+    if not np.isfinite(recording.headings).all():
+        return False
+    ways = (_along_and_across(way)[1] for way in (recording, replace(recording, rear=0.0)))
+    body, centre = (float(np.abs(across).sum()) for across in ways)
+    return body <= centre
 
 
 def require_start(recording: Recording, x: float, y: float, heading: float, speed: float) -> None:

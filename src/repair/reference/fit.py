@@ -103,10 +103,22 @@ def _swings(scene: Scene, smooth: UniformBSpline) -> bool:
 def _by_the_body(recording: Recording, dt: float) -> Array:
     """Velocities (K, 2) of the centre [m/s], by the speed, heading and turning of the body."""
     heading = np.unwrap(recording.headings)
-    across = recording.rear * np.gradient(heading, dt)
+    across = recording.rear * np.gradient(heading, dt, edge_order=2)
     cos, sin = np.cos(heading), np.sin(heading)
     x, y = recording.speeds * cos - across * sin, recording.speeds * sin + across * cos
     return np.stack([x, y], axis=1)
+
+
+def _setting_out(scene: Scene, recording: Recording, speed: float) -> Array:
+    """Velocity (1, 2) of the centre at the start [m/s], by the orientation and the turning of the body.
+
+    It slips no more than the steering allows, so that noise says nothing while the vehicle stands.
+    """
+    vehicle, heading = scene.vehicle, np.unwrap(recording.headings[:3])
+    most = abs(speed) * vehicle.rear / vehicle.wheelbase * np.tan(vehicle.steering_max)
+    across = np.clip(vehicle.rear * np.gradient(heading, scene.dt, edge_order=2)[0], -most, most)
+    cos, sin = np.cos(heading[0]), np.sin(heading[0])
+    return np.array([[speed * cos - across * sin, speed * sin + across * cos]])
 
 
 def _roughness(exact: BernsteinCurve) -> float:
@@ -193,8 +205,11 @@ def _smooth(
         state[1, 0] = own
     spacing = max(_SPACING, 2.0 * scene.dt)
     # Who is said to brake and would stop within a knot need not do so: the positions say how it goes on.
-    stops = state[1, 0] + min(state[2, 0], 0.0) * spacing < min(state[1, 0], 0.0)
-    best, off = _fitted(coordinates, state[:2] if stops else state, scene.dt, spacing)
+    free = state[1, 0] + min(state[2, 0], 0.0) * spacing < min(state[1, 0], 0.0)
+    if recording.velocities is None and scene.first_heading is not None:
+        state[1] = _in_frame(scene, coordinates[:1], _setting_out(scene, recording, own))[0]
+        free = True  # they also say how a body bends that need not drive steadily yet
+    best, off = _fitted(coordinates, state[:2] if free else state, scene.dt, spacing)
     for finer, fixed in ((spacing, 2), (0.5 * spacing, 2)):
         if noisy or off <= _FIT_OFF:
             break

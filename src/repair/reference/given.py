@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from repair.arrays import Array, column
+from repair.arrays import Array, column, wrap
 from repair.curves.base import Curve, is_curve
 from repair.curves.codec import curve_to_dict, read_curve
 from repair.errors import ReferenceTrajectoryError, foreign
@@ -22,6 +22,7 @@ from repair.reference.consistency import (
     START_OFF,
     START_SPEED_OFF,
     Recording,
+    are_of_the_body,
     require_consistent,
     require_start,
     require_turns,
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 __all__ = ["GivenReference", "given_reference", "given_start", "no_given_reference"]
 
+_SAME_HEADING = 0.01  # a body that begins with the ego's orientation is off by no more than this [rad]
+
 
 @dataclass(frozen=True)
 class GivenReference:
@@ -55,12 +58,15 @@ class GivenReference:
         As ``result.json`` holds it; :func:`given_reference` reads it again.
     places : (frame, (K, 2) array) or None
         The positions in a frame, where somebody has projected them already.
+    heading : float or None
+        Orientation of the body at the start [rad], where the reference says it.
     """
 
     recording: Recording | None
     path: Curve | None
     plain: dict[str, Any]
     places: tuple[FrenetFrame, Array] | None = None
+    heading: float | None = None
 
     @property
     def positions(self) -> Array | None:
@@ -70,7 +76,7 @@ class GivenReference:
     @property
     def track(self) -> Track | None:
         """The same as a track."""
-        return None if self.positions is None else Track(self.positions)
+        return None if self.positions is None else Track(self.positions, self.heading)
 
     def curve(self, scene: Scene) -> Curve:
         """The reference in the scene's frame.
@@ -135,7 +141,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
     made = _recording(at_steps(table, scene.dt), scene)
     _require_start(made, scene)
     plain = {k: v.tolist() for k, v in zip(KEYS, table.T, strict=True) if np.isfinite(v).all()}
-    return GivenReference(made, None, plain)
+    return GivenReference(made, None, plain, heading=_body_at_start(made, scene))
 
 
 def no_given_reference(scene: Scene, config: ReferenceConfig, occupancy: Occupancy) -> Curve:
@@ -238,6 +244,15 @@ def _require_start(made: Recording, scene: Scene) -> None:
     require_start(made, start.x, start.y, start.orientation, start.velocity)
 
 
+def _body_at_start(made: Recording, scene: Scene) -> float | None:
+    """Orientation of the body at the start [rad]; None where headings are of the path, or not the ego's."""
+    yaw = float(made.headings[0])
+    # As result.json has it, where no model of a trajectory is known any more.
+    made = replace(made, rear=scene.vehicle.rear, directions=made.headings)
+    same = abs(float(wrap(yaw - scene.initial_state.orientation))) <= _SAME_HEADING
+    return yaw if same and are_of_the_body(made) else None
+
+
 def _states_of(trajectory: Any, first: int | None, scene: Scene) -> Recording:
     """The states of a CommonRoad trajectory, which begins at step ``first``, or at any."""
     with foreign("reading the given trajectory", ReferenceTrajectoryError):
@@ -262,7 +277,7 @@ def _of_trajectory(made: Recording, scene: Scene) -> GivenReference:
     require_consistent(made, scene.dt, scene.vehicle)
     table = _table_of_states(made, scene.dt)
     plain = {k: column(v, 12) for k, v in zip(KEYS, table.T, strict=True) if np.isfinite(v).all()}
-    return GivenReference(made, None, plain)
+    return GivenReference(made, None, plain, heading=_body_at_start(made, scene))
 
 
 def _rounded(values: Array) -> Array:
