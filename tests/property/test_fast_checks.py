@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,7 +24,7 @@ from repair.vehicle.transitions import direct_check, transition_errors
 from repair.vehicle.transitions_fast import clearly_drivable
 from repair.world.collision import CollisionWorld
 from repair.world.road import RoadBoundary, grouping
-from repair.world.road_corridor import RoadCorridor
+from repair.world.road_corridor import RoadCorridor, _reach
 from repair.world.tracks import AFTER, BEFORE, INSTANT
 
 EGO = load_vehicle(1)
@@ -162,6 +163,36 @@ def test_the_corridor_holds_only_what_is_on_the_road(seed):
     s = s + rng.choice([0.0, 0.0, 1.0, 200.0], 400)  # a wrong cell may only say that it does not know
     held = corridor.holds(s, np.ascontiguousarray(xy).view(np.complex128)[:, 0], orientation)
     assert road.inside(road.outline(*xy.T, orientation))[held].all()
+
+
+def reach(u, w, along):
+    """Return least and largest w of an edge's part with |u| <= along in exact numbers; None without one."""
+    (u0, u1), (w0, w1), along = (Fraction(v) for v in u), (Fraction(v) for v in w), Fraction(along)
+    parts = [Fraction(0), Fraction(1)]
+    if u0 != u1:
+        parts += [p for p in ((side - u0) / (u1 - u0) for side in (along, -along)) if 0 <= p <= 1]
+    found = [w0 + p * (w1 - w0) for p in parts if abs(u0 + p * (u1 - u0)) <= along]
+    return (min(found), max(found)) if found else None
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_no_edge_reaches_farther_than_the_corridor_takes_it(seed):
+    """However little it goes on along the axis: differences may be as small as numbers get."""
+    rng = np.random.default_rng(seed)
+    along, count = 3.3, 40
+    first = rng.choice([0.0, along, -along, *rng.uniform(-5.0, 5.0, 4)], count)
+    run = rng.choice([-1.0, 0.0, 1.0], count) * 10.0 ** rng.choice([0, -1, -5, -7, -12, -307, -320], count)
+    u, w = np.array([first, first + run]), rng.uniform(-15.0, 15.0, (2, count))
+    low, high = _reach(u, w, along)
+    for k in range(count):
+        plain = reach(u[:, k], w[:, k], along)
+        if plain is None:
+            continue
+        assert low[k] <= plain[0] + 1e-7
+        assert high[k] >= plain[1] - 1e-7
+        if abs(u[1, k] - u[0, k]) > 1e-6:
+            assert (low[k], high[k]) == pytest.approx([float(v) for v in plain], abs=1e-7)
 
 
 def test_the_corridor_holds_nearly_up_to_the_edge():

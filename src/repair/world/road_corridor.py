@@ -21,6 +21,7 @@ __all__ = ["RoadCorridor"]
 _CELL = 1.0
 _ALONG = 0.9
 _ASIDE = 10.0
+_ACROSS = 1e-6  # an edge that goes on by less than this along the axis is across it [m]
 # As arrays, because NumPy takes long to convert a plain number.
 _NONE, _AHEAD = np.array(0.0), np.array(_ALONG)
 
@@ -96,12 +97,9 @@ def _room(region: Any, middle: Points, axis: Points, along: float) -> tuple[Arra
     boxes = (along * corners.real + 1j * _ASIDE * corners.imag) * axis[:, None] + middle[:, None]
     cell, edge = edges.query(shapely.polygons(boxes.view(np.float64).reshape(-1, 4, 2)))
     seen = (points[start[edge] + np.arange(2)[:, None]] - middle[cell]) * axis[cell].conj()
-    # The part of each edge with |u| <= along, u and w being its coordinates seen from the cell.
     u, w = seen.real, seen.imag
-    slope = np.where(u[1] == u[0], 0.0, (w[1] - w[0]) / np.where(u[1] == u[0], 1.0, u[1] - u[0]))
-    ends = np.where(u[1] == u[0], w, w[0] + slope * (np.clip(u, -along, along) - u[0]))
     met = (u.min(axis=0) <= along) & (u.max(axis=0) >= -along)
-    low, high = ends.min(axis=0), ends.max(axis=0)
+    low, high = _reach(u, w, along)
     for bound, least, side, nearest in (
         (left, np.minimum, met & (high >= 0.0), np.maximum(low, 0.0)),
         (right, np.maximum, met & (low <= 0.0), np.minimum(high, 0.0)),
@@ -110,3 +108,16 @@ def _room(region: Any, middle: Points, axis: Points, along: float) -> tuple[Arra
     outside = ~shapely.contains_properly(region, shapely.points(middle.real, middle.imag))
     left[outside] = right[outside] = 0.0
     return right, left
+
+
+def _reach(u: Array, w: Array, along: float) -> tuple[Array, Array]:
+    """Least and largest w (E,) of the part of each edge, from (u, w)[0] to (u, w)[1], with ``|u| <= along``.
+
+    Of edges across the axis it is that of the whole edge, which is not less: where they cross ``along`` is a
+    quotient of rounding errors.
+    """
+    run = u[1] - u[0]
+    across = np.abs(run) < _ACROSS
+    slope = (w[1] - w[0]) / np.where(across, 1.0, run)
+    ends = np.where(across, w, w[0] + slope * (np.clip(u, -along, along) - u[0]))
+    return ends.min(axis=0), ends.max(axis=0)
