@@ -9,6 +9,7 @@ import warnings
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -357,6 +358,20 @@ WRONG = {
         lambda s: {"ego": {"x": np.nan, "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "not finite"
     ),
     "a letter": (lambda s: {"ego": {"x": "a", "y": 0.0, "yaw": 0.0, "v": 0.0}}, ScenarioError, "no number"),
+    "a state with a letter": (
+        lambda s: {"ego": replace(s.initial_state, x="a")}, ScenarioError, "the ego's x is 'a', which is no n"
+    ),
+    "a state without end": (
+        lambda s: {"ego": replace(s.initial_state, acceleration=np.inf)}, ScenarioError,
+        "the ego's acceleration is not finite",
+    ),
+    "too fast": (
+        lambda s: {"ego": replace(s.initial_state, velocity=200.0)}, ScenarioError, "the ego's speed is 200"
+    ),
+    "a state of half an ego": (
+        lambda s: {"ego": SimpleNamespace(position=np.zeros(2), velocity=1.0)}, ScenarioError,
+        "the ego's state has no orientation",
+    ),
     "a kind of car": (
         lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, kind="spaceship")]},
         ScenarioError, "no kind 'spaceship'",

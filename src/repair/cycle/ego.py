@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
-
-import numpy as np
 
 from repair.errors import ScenarioError, in_words, kind_of
 from repair.reference.given import given_start
 from repair.scene.scene import InitialState, Scene
-from repair.scene.start import initial_state_of
+from repair.scene.start import initial_state_of, possible_state
 
 __all__ = ["ego_of"]
 
 _EGO = ("x", "y", "yaw", "v")
+_WHOSE = "the ego's"  # in sentences
 
 
 def ego_of(ego: Any, reference: Any, scene: Scene) -> InitialState:
@@ -23,10 +23,10 @@ def ego_of(ego: Any, reference: Any, scene: Scene) -> InitialState:
     Raises
     ------
     ScenarioError
-        If something of it is missing or no number.
+        If something of it is missing, no number, or out of range.
     """
     if isinstance(ego, InitialState):
-        return ego
+        return possible_state((getattr(ego, part.name) for part in fields(InitialState)), _WHOSE)
     if ego is None:
         return given_start(reference, scene)
     if isinstance(ego, Mapping):
@@ -35,20 +35,10 @@ def ego_of(ego: Any, reference: Any, scene: Scene) -> InitialState:
         if strange or missing:
             wrong = f"has {in_words(strange[0])}" if strange else f"lacks {missing[0]}"
             raise ScenarioError(f"the ego's state {wrong}; it is x, y, yaw, v and, if known, a and yaw_rate")
-        x, y, yaw, v = (_number(ego[k], k) for k in _EGO)
-        return InitialState(x, y, yaw, v, *(_number(ego.get(k, 0.0), k) for k in ("a", "yaw_rate")))
+        values = (*(ego[k] for k in _EGO), *(ego.get(k, 0.0) for k in ("a", "yaw_rate")))
+        return possible_state(values, _WHOSE)
     if hasattr(ego, "position"):
-        return initial_state_of(ego)
+        return initial_state_of(ego, _WHOSE)
     raise ScenarioError(
         f"the ego's state is a mapping x, y, yaw, v, or a CommonRoad state, not {kind_of(ego)}"
     )
-
-
-def _number(value: Any, name: str) -> float:
-    try:
-        found = float(value)
-    except (TypeError, ValueError) as error:
-        raise ScenarioError(f"the ego's {name} is {in_words(value)}, which is no number") from error
-    if not np.isfinite(found):
-        raise ScenarioError(f"the ego's {name} is not finite")
-    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,14 @@ if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
     from repair.scene.scene import Scene
 
-__all__ = ["SPEED_RANGE", "first_step_of", "initial_state_of", "is_ego", "slip_at_start"]
+__all__ = [
+    "SPEED_RANGE",
+    "first_step_of",
+    "initial_state_of",
+    "is_ego",
+    "possible_state",
+    "slip_at_start",
+]
 
 SPEED_RANGE = (-0.1, 100.0)
 """Initial speeds that can be dealt with [m/s]."""
@@ -29,8 +37,14 @@ _UNSTEADY, _STATED = 0.003, 0.03
 _CRAWLS, _NEAR = 1.0, 0.1  # [m/s], [rad]; from there a body comes to its path by steering of 0.1 rad/s
 
 
-def initial_state_of(state: Any) -> InitialState:
+def initial_state_of(state: Any, whose: str = "the planning problem's initial") -> InitialState:
     """Read a planning problem's initial state; of an interval, the middle.
+
+    Parameters
+    ----------
+    state : commonroad.scenario.state.State
+    whose : str
+        In sentences, before what of the state is meant.
 
     Raises
     ------
@@ -41,7 +55,7 @@ def initial_state_of(state: Any) -> InitialState:
     values = []
     position = getattr(state, "position", None)
     if position is None or hasattr(position, "center") or hasattr(position, "shapes"):
-        raise ScenarioError("the planning problem's initial position is not an exact point")
+        raise ScenarioError(f"{whose} position is not an exact point")
     # A point mass has no orientation of its own, and its velocity is that along x alone.
     point = "velocity_y" in vars(state) and "orientation" not in vars(state)
     for name in ("orientation", "velocity", "acceleration", "yaw_rate"):
@@ -51,34 +65,44 @@ def initial_state_of(state: Any) -> InitialState:
         if name == "orientation" and point and state.velocity == state.velocity_y == 0.0:
             value = None  # commonroad-io makes 0 of it
         if value is None and name in ("orientation", "velocity"):
-            raise ScenarioError(f"the planning problem's initial state has no {name}")
-        values.append(0.0 if value is None else _number(value, name))
+            raise ScenarioError(f"{whose} state has no {name}")
+        values.append(0.0 if value is None else value)
     if point:
-        values[1] = math.hypot(values[1], _number(state.velocity_y, "velocity_y"))
+        pair = (_number(v, f"{whose} velocity") for v in (values[1], state.velocity_y))
+        values[1] = math.hypot(*pair)
     if np.shape(position) != (2,):
-        raise ScenarioError(f"the planning problem's initial position is {in_words(position)}; it is x, y")
-    numbers = [_number(position[0], "position"), _number(position[1], "position"), *values]
-    if not np.isfinite(numbers).all():
-        raise ScenarioError("the planning problem's initial state is not finite")
+        raise ScenarioError(f"{whose} position is {in_words(position)}; it is x, y")
+    return possible_state((*position, *values), whose)
+
+
+def possible_state(values: Iterable[Any], whose: str) -> InitialState:
+    """The state of six numbers, in the order of :class:`InitialState`, that can be dealt with.
+
+    Raises
+    ------
+    ScenarioError
+        If one is no number, not finite, or out of range.
+    """
+    names = ("x", "y", "orientation", "velocity", "acceleration", "yaw rate")
+    numbers = [_number(value, f"{whose} {name}") for value, name in zip(values, names, strict=True)]
+    for number, name in zip(numbers, names, strict=True):
+        if not math.isfinite(number):
+            raise ScenarioError(f"{whose} {name} is not finite")
     made = InitialState(*numbers)
     if max(abs(made.x), abs(made.y)) > FAR:
-        raise ScenarioError(
-            f"the ego's initial position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out"
-        )
+        raise ScenarioError(f"{whose} position ({made.x:g}, {made.y:g}) is farther than {FAR:g} m out")
     if not SPEED_RANGE[0] <= made.velocity <= SPEED_RANGE[1]:
         raise ScenarioError(
-            f"the ego's initial speed is {made.velocity:g} m/s; it has to be from 0 to {SPEED_RANGE[1]:g} m/s"
+            f"{whose} speed is {made.velocity:g} m/s; it has to be from 0 to {SPEED_RANGE[1]:g} m/s"
         )
     return made
 
 
-def _number(value: Any, name: str) -> float:
+def _number(value: Any, what: str) -> float:
     try:
         return float(value)
-    except (TypeError, ValueError) as error:
-        raise ScenarioError(
-            f"{name} of the planning problem's initial state is {in_words(value)}, which is no number"
-        ) from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ScenarioError(f"{what} is {in_words(value)}, which is no number") from error
 
 
 def first_step_of(state: Any) -> int:
