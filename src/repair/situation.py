@@ -11,6 +11,7 @@ from repair.arrays import Array, in_seconds
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.curves.base import Curve, SplicedCurve
+from repair.errors import ScenarioError, kind_of
 from repair.onward.plan import Onward, back_to_reference, to_the_goal
 from repair.problem.factory import ProblemFactory, Unguided
 from repair.problem.limits import Limits
@@ -27,7 +28,7 @@ from repair.world.dead_ends import dead_ends, with_boxes
 if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
-__all__ = ["Situation"]
+__all__ = ["Situation", "require_situation"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -171,3 +172,18 @@ class Situation:
         if self.checker.config.terminal == "off":
             return None
         return self.ends(SplicedCurve(self.reference, repaired, t_rep), self.t_end)
+
+
+def require_situation(thing: object) -> None:
+    """Refuse what is no situation.
+
+    Raises
+    ------
+    ScenarioError
+        It says where one comes from.
+    """
+    if not isinstance(thing, Situation):
+        raise ScenarioError(
+            "what repair.prepare(scene, config) returns is expected (of a result, result.prepared), "
+            f"not {kind_of(thing)}"
+        )

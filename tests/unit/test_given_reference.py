@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from tests import roads
 import repair
 from repair.certify.certificate import format_certificate
 from repair.certify.recompute import certify
-from repair.errors import ConfigError, ReferenceTrajectoryError
+from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError
 from repair.reference.given import given_reference
 
 
@@ -137,8 +138,22 @@ def test_an_earlier_result_is_followed(scene, usual, tmp_path):
     again = repair.repair(scene, reference=usual)
     assert again.search.conflict.contact_time == np.inf
     usual.save(tmp_path, figure=False)
-    read = repair.repair(scene, reference=repair.load_result(tmp_path))
-    assert read.search.conflict == again.search.conflict
+    read = repair.load_result(tmp_path)
+    assert repair.repair(scene, reference=read).search.conflict == again.search.conflict
+    for result in (usual, read):
+        prepared = repair.prepare(scene, repair.load_config(), reference=result)
+        assert prepared.conflict == again.search.conflict
+
+
+@pytest.mark.parametrize("thing", ["result", "scene", None])
+@pytest.mark.parametrize(
+    "ask",
+    [repair.bound, repair.mitigate, partial(repair.explain, found=None)],
+    ids=["bound", "mitigate", "explain"],
+)
+def test_what_was_not_prepared_is_a_sentence(ask, thing, scene, usual):
+    with pytest.raises(RepairError, match=r"repair\.prepare\(scene, config\) returns is expected"):
+        ask({"result": usual, "scene": scene}.get(thing))
 
 
 def shifted(column, by, rows=slice(None)):

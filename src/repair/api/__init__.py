@@ -17,7 +17,6 @@ from repair.deadline import OutOfTime, until
 from repair.errors import BackendError, ConfigError, RepairError, foreign, kind_of
 from repair.metrics.base import Asked, MetricValue
 from repair.metrics.registry import measure
-from repair.outcome.data import Outcome
 from repair.outcome.driven import what_is_driven
 from repair.outcome.known import what_is_known
 from repair.preparation import Phases, Prepared, among, prepare
@@ -98,10 +97,6 @@ def repair(
     if traffic is not None:
         with phases("load"):
             scene = with_traffic(scene, traffic, threshold=0.0 if threshold is None else threshold)
-    if isinstance(reference, RepairResult):
-        reference = reference.states
-    elif isinstance(reference, Outcome):
-        reference = reference.driven()
     return search(
         prepare(scene, config, reference),
         backend,

@@ -18,6 +18,7 @@ from repair.bounds.settings import BoundConfig
 from repair.bounds.start import driven_within, motions_from
 from repair.bounds.tree import Attempt, attempt
 from repair.deadline import in_time
+from repair.situation import require_situation
 from repair.timegrid import STEP, steps_until
 from repair.vehicle.model import KinematicSingleTrack
 
@@ -107,7 +108,13 @@ def bound(situation: Situation, settings: BoundConfig | None = None) -> dict[str
     -------
     dict
         A :class:`Bound` for each of ``settings.kinds``.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no situation.
     """
+    require_situation(situation)
     if settings is None:
         config: Any = getattr(situation, "config", None)
         settings = config.bound if config is not None else BoundConfig()

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from repair.api import RepairResult, find
+from repair.api import find
 from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
@@ -31,9 +31,8 @@ from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, kind_of
-from repair.outcome.data import Outcome
 from repair.preparation import Prepared, among, laid_out
-from repair.reference.given import GivenReference, given_reference
+from repair.reference.given import GivenReference, given_reference, what_drives
 from repair.scene.commonroad import moved_on
 from repair.scene.reframe import lanes_at, reframe
 from repair.scene.road.lanes import Lane
@@ -203,10 +202,7 @@ class Repairer:
         begin = time.perf_counter()
         require_deadline(deadline)
         others = Others.of(traffic, threshold)
-        if isinstance(reference, RepairResult | Cycle):
-            reference = reference.states
-        elif isinstance(reference, Outcome):
-            reference = reference.driven()
+        reference = what_drives(reference)
         if reference is None:
             raise ReferenceTrajectoryError(
                 "a plan is needed, and None is none; a cycle that had no time has none either"

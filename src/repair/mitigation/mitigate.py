@@ -16,6 +16,7 @@ from repair.deadline import OutOfTime, in_time, until
 from repair.errors import RepairError
 from repair.mitigation.impact import Impact, ImpactJudge
 from repair.mitigation.settings import MitigationConfig
+from repair.situation import require_situation
 from repair.solvers.shooting.impact import Impacts
 from repair.solvers.shooting.plans import ALONG, FREE
 from repair.solvers.shooting.settings import ShootingConfig
@@ -109,8 +110,9 @@ def mitigate(situation: Situation, settings: MitigationConfig | None = None) -> 
     Raises
     ------
     RepairError
-        If there is no conflict, or the ego is in contact at the very start.
+        If there is no conflict, the ego is in contact at the very start, or it is no situation.
     """
+    require_situation(situation)
     config: Any = getattr(situation, "config", None)
     if settings is None:
         settings = config.mitigation if config is not None else MitigationConfig()

@@ -31,6 +31,7 @@ from repair.reference.fit import fit_recording
 from repair.reference.recorded import states_of
 from repair.scene.scene import InitialState
 from repair.timegrid import steps_until
+from repair.vehicle.states import DrivenStates
 
 if TYPE_CHECKING:
     from repair.reference.settings import ReferenceConfig
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
     from repair.world.boxes import Occupancy
 
-__all__ = ["GivenReference", "given_reference", "given_start", "no_given_reference"]
+__all__ = ["GivenReference", "given_reference", "given_start", "no_given_reference", "what_drives"]
 
 _SAME_HEADING = 0.01  # a body that begins with the ego's orientation is off by no more than this [rad]
 
@@ -93,6 +94,14 @@ class GivenReference:
         return fit_recording(scene, self.recording, coordinates=places if frame is scene.frame else None)
 
 
+def what_drives(thing: Any) -> Any:
+    """What an earlier result drives (None where it had no time to say so); anything else as it is."""
+    states = getattr(thing, "states", thing)
+    if states is None or isinstance(states, DrivenStates):
+        return states
+    return thing.driven() if callable(getattr(thing, "driven", None)) else thing
+
+
 def given_reference(thing: Any, scene: Scene) -> GivenReference:
     """A reference that a program hands over.
 
@@ -105,7 +114,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
         - a mapping (or table) with these names, each (N,);
         - a ``commonroad.scenario.trajectory.Trajectory`` of any state type, which begins at the planning
           problem's initial time step; states need say no more than their position;
-        - driven states, such as those of an earlier result;
+        - driven states, or an earlier result, of which those are meant;
         - a :class:`repair.curves.base.Curve` in the scene's own frame.
 
         ``t`` is in seconds from the planning problem's start and begins with 0; ``x, y`` are of the
@@ -124,6 +133,7 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
         speeds or headings by more than CommonRoad's own checks allow
         (:mod:`repair.reference.consistency`), or a start elsewhere than the ego's.
     """
+    thing = what_drives(thing)
     if isinstance(thing, Mapping) and set(thing) == {"curve"}:
         thing = read_curve(thing["curve"])
     if is_curve(thing):

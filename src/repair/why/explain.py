@@ -11,6 +11,7 @@ from repair.config.schema import Config
 from repair.preparation import Prepared
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import ExplainConfig
+from repair.situation import require_situation
 from repair.solvers.registry import fallbacks_of, make_backend
 from repair.timegrid import INSTANT
 from repair.why.asked import Asked, Cut
@@ -117,6 +118,7 @@ def explain(
     An amount is the smallest for which a repair was found that passes the checker under that assumption,
     to the resolution of its kind, and with half of it none was found by those who were asked.
     """
+    require_situation(prepared)
     found = getattr(found, "search", found)
     settings = settings or prepared.config.explain
     t_rep = explained_time(found)
