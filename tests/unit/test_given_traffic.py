@@ -219,6 +219,7 @@ WRONG = {
     "a letter": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), "a", 2)], "'a' and 2"),
     "two shapes": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, shape=[[0, 0]] * 3)], "either a"),
     "no shape": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), shape="round")], "neither one of"),
+    "sets of nobody": (lambda s: [repair.Prediction(1, occupancies=[None] * 20)], "0 of its 20 occupancies"),
     "away": (lambda s: [repair.Prediction(1, occupancies=[SQUARE, None, SQUARE])], "at step 1 it is nowhere"),
     "a size of sets": (lambda s: [repair.Prediction(1, length=4, occupancies=[SQUARE] * 3)], "leave shape"),
     "likely": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, probability=2)], "probability"),

@@ -70,7 +70,10 @@ def sets_of(prediction: Prediction, what: str) -> tuple[int, list[Any]]:
     made = [_set(given, k, what) for k, given in enumerate(prediction.occupancies or ())]
     there = [k for k, shape in enumerate(made) if shape is not None]
     if len(there) < 2:
-        raise ScenarioError(f"{what}: it has {len(there)} occupancies; one for each step is expected")
+        raise ScenarioError(
+            f"{what}: {len(there)} of its {len(made)} occupancies say where it is; at least two have to, "
+            "and there is one for each step"
+        )
     known = made[there[0] : there[-1] + 1]
     if len(there) < len(known):
         hole = there[0] + next(k for k, shape in enumerate(known) if shape is None)
