@@ -17,6 +17,7 @@ from repair.cli.command import main
 from repair.errors import RepairError
 from repair.paper.bundled import paper_scenario
 from repair.problem.limits import Limits
+from repair.scene.commonroad import load_scene
 
 
 @pytest.fixture(scope="module")
@@ -213,6 +214,19 @@ def test_the_vehicle_is_driven_from_the_start(scenarios, tmp_path):
     repair(scenarios / "DEU_Lohmar-37_1_T-1.xml").save(tmp_path, figure=False)
     rows = {row.name: row for row in certify(tmp_path).rows}
     assert rows["first contact of the shapes"].ok
+
+
+def test_a_plan_from_memory_may_begin_as_far_aside_as_it_is_taken(scenarios, tmp_path):
+    """It is CommonRoad's tolerance; a plan that is made here has none."""
+    scene = load_scene(scenarios / "DEU_Flensburg-6_1_T-1.xml")
+    start, t = scene.initial_state, scene.dt * np.arange(31)
+    along = np.array([np.cos(start.orientation), np.sin(start.orientation)])
+    places = np.array([start.x, start.y]) + 0.05 * along + np.outer(start.velocity * t, along)
+    result = repair(scene, reference=np.column_stack([t, places]), backend="ego")
+    result.save(tmp_path, figure=False)
+    rows = [row for row in certify(tmp_path).rows if row.name.startswith("start: ")]
+    assert all(row.ok for row in rows)
+    assert max(row.value for row in rows if "position" in row.name) == pytest.approx(0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("when, ok", [(0.0, True), (1.0, False)], ids=["standing", "driving"])

@@ -125,7 +125,7 @@ def _certified(folder: Path, content: Mapping[str, Any]) -> Certificate:
     steps = first, first + steps_until(t_end, dt)
     name = str(anew.scenario.scenario_id)
     rows += [*road, *form_rows(solution, part, states, steps, name, scene.planning_problem_id, scene.vehicle)]
-    rows += start_rows(states, problem, scene.vehicle, given=prepared.config.reference.source == "file")
+    rows += start_rows(states, problem, scene.vehicle, prepared.config.reference.source)
     rows += agreement_rows(states, planned, scene.vehicle, dt, first)
     rows += _record_rows(content, prepared, curve, states, traffic)
     rows += late_rows(folder, content, prepared, anew.scenario, traffic, _reference(content, prepared))

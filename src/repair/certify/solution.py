@@ -30,6 +30,7 @@ __all__ = [
 START = (1e-3, 1e-2, 1e-2)
 #: The same of a reference that was given, as CommonRoad's solution checker has it: 0.1 m along either axis.
 GIVEN_START = (0.15, 0.1, 2.0)
+_GIVEN = ("file", "given")  # sources of such references
 STANDS = 1e-2  #: slower than this it stands [m/s]
 
 
@@ -90,10 +91,8 @@ def form_rows(
     return rows
 
 
-def start_rows(
-    states: States, problem: Any, vehicle: Vehicle, *, given: bool = False
-) -> list[CertificateRow]:
-    """By how much the first state is off the planning problem's; ``given`` ones as CommonRoad allows.
+def start_rows(states: States, problem: Any, vehicle: Vehicle, source: str = "") -> list[CertificateRow]:
+    """By how much the first state is off the planning problem's; of given references as CommonRoad allows.
 
     Its speed is that of the rear axle, or that of the middle: CommonRoad does not say of which the planning
     problem's is.
@@ -105,7 +104,7 @@ def start_rows(
     slip = np.arctan(vehicle.rear / vehicle.wheelbase * np.tan(states.steering[0]))
     speeds = np.array([states.speed[0], states.speed[0] / np.cos(slip)])
     faster = float(np.abs(speeds - _middle(initial.velocity)).min())
-    allowed = GIVEN_START if given else START
+    allowed = GIVEN_START if source in _GIVEN else START
     return [
         at_most("start: position off by", off, allowed[0], "files", "m"),
         at_most("start: orientation off by", turned, allowed[1], "files", "rad"),

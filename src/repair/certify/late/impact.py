@@ -121,7 +121,7 @@ def _rows(
         yield said("time steps", False, "files")
         return
     motion = through_states(states, first, dt, vehicle)
-    yield from start_rows(states, problem, vehicle, given=prepared.config.reference.source == "file")
+    yield from start_rows(states, problem, vehicle, prepared.config.reference.source)
     yield from physical_rows(states, dt, vehicle)
     ends, time = str(one["ends"]), _time(one)
     if (ends == "none") != (one["contact_t_s"] is None) or ends not in ("contact", "off_road", "none"):
