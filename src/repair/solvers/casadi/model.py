@@ -34,7 +34,7 @@ __all__ = ["TOLERANCE", "Model", "Solution", "build_model", "megabytes", "status
 
 TOLERANCE = 1e-6  #: largest violation of a curve that is called solved
 _DAQP_INFEASIBLE = -1
-_KEPT, _IDLE = 72.0, 36.0  # of models, their NLPs included, and of those not asked for lately as well [MB]
+_KEPT, _IDLE = 54.0, 27.0  # of models, their NLPs included, and of those not asked for lately as well [MB]
 # What making a model takes [s], by entry of its matrix, and an NLP, by sample; CasADi cannot be interrupted.
 # Before any was made they are those of a slow machine.
 _LAID_OUT = Estimate(5e-7)
