@@ -156,6 +156,11 @@ def test_what_was_not_prepared_is_a_sentence(ask, thing, scene, usual):
         ask({"result": usual, "scene": scene}.get(thing))
 
 
+def test_what_no_search_found_is_a_sentence(scene, usual):
+    with pytest.raises(RepairError, match="what a search of it found is expected"):
+        repair.explain(usual.prepared, scene)
+
+
 def shifted(column, by, rows=slice(None)):
     def change(values):
         values[rows, column] += by

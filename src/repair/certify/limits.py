@@ -9,6 +9,7 @@ import numpy as np
 from repair.arrays import Array
 from repair.certify.certificate import CertificateRow, at_least, at_most
 from repair.certify.motion import Motion, States
+from repair.certify.solution import STANDS
 from repair.timegrid import INSTANT
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
 _PLACE, _ORIENTATION = 0.02, 0.03  # the drivability checker's tolerances [m], [rad]
-_STANDS = 0.01  # slower than this a direction is held, and jumps where it is not any more [m/s]
 _PARTS = 20  # of a step, in which the model is integrated
 # Steering angle [rad] and speed [m/s] at the end of a step beside the next state's, within its tolerances.
 _ELSEWHERE = [(beyond, faster) for beyond in np.linspace(-0.03, 0.03, 13) for faster in (0.0, -0.03, 0.03)]
@@ -44,8 +44,9 @@ def driven_rows(motion: Motion, limits: Limits, reference: Limits, t_rep: float)
     step = np.diff(motion.t)
     along = np.diff(motion.speed) / step
     across = 0.5 * (motion.speed[1:] + motion.speed[:-1]) * np.diff(motion.heading) / step
-    slow = np.minimum(np.abs(motion.speed[1:]), np.abs(motion.speed[:-1])) < _STANDS
-    across[slow] = 0.0  # who stands with turned wheels begins elsewhere than it ended, without any force
+    slow = np.minimum(np.abs(motion.speed[1:]), np.abs(motion.speed[:-1])) < STANDS
+    # A direction is held where it stands; who sets out with turned wheels leaves it without any force.
+    across[slow] = 0.0
     begins = int(motion.t.searchsorted(t_rep - INSTANT))
     rolling = min(0.0, float(motion.speed[0]))
     parts = [

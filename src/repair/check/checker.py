@@ -13,7 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.followed import Followed, is_finite, motion_of, slip_at_start
+from repair.check.followed import Followed, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
     curve_excess,
@@ -30,6 +30,7 @@ from repair.curves.base import Curve, FrenetTrajectory
 from repair.deadline import in_time
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
+from repair.scene.start import slip_at_start
 from repair.timegrid import INSTANT, steps_until
 from repair.vehicle.states import DrivenStates
 from repair.world.collision import CollisionWorld
@@ -73,8 +74,7 @@ class Checker:
         before = None if like is None else like.edge
         self.edge: RoadEdge | None = road_edge(scene, config.road_gap, before) if config.road else None
         self.road = None if self.edge is None else self.edge.boundary
-        samples = np.arange(scene.n_steps * config.substeps + 1)
-        self._times = frozen(samples * (scene.dt / config.substeps))
+        self._times = frozen(np.arange(scene.n_steps * config.substeps + 1) * (scene.dt / config.substeps))
         self._followed: Followed | None = None
         self._crossing: tuple[Followed, bool] | None = None
         self._touched: tuple[Curve, float, Contact | None] | None = None  # what the last reference touches

@@ -11,12 +11,11 @@ import numpy as np
 from repair.arrays import Array
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import STANDSTILL
-from repair.scene.start import slip_at_start
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
 
-__all__ = ["Followed", "is_finite", "motion_of", "slip_at_start"]
+__all__ = ["Followed", "is_finite", "motion_of"]
 
 
 @dataclass(frozen=True)

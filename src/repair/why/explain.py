@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from repair.backend.base import RepairBackend
 from repair.config.schema import Config
+from repair.errors import RepairError, kind_of
 from repair.preparation import Prepared
 from repair.search.result import SearchResult, SearchStatus
 from repair.search.settings import ExplainConfig
@@ -107,6 +108,11 @@ def explain(
     on_progress : callable, optional
         Called with what is looked at next, in words.
 
+    Raises
+    ------
+    RepairError
+        If one of the two is something else.
+
     Returns
     -------
     Explanation or None
@@ -120,6 +126,8 @@ def explain(
     """
     require_situation(prepared)
     found = getattr(found, "search", found)
+    if not isinstance(found, SearchResult):
+        raise RepairError(f"what a search of it found is expected, or a result, not {kind_of(found)}")
     settings = settings or prepared.config.explain
     t_rep = explained_time(found)
     if t_rep is None or not math.isfinite(prepared.conflict.time):
