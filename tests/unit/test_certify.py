@@ -216,6 +216,14 @@ def test_the_vehicle_is_driven_from_the_start(scenarios, tmp_path):
     assert rows["first contact of the shapes"].ok
 
 
+def test_a_reconstruction_is_written_beside_a_result_that_is_saved_later(monkeypatch, tmp_path):
+    monkeypatch.delenv("COMMONROAD_SCENARIOS", raising=False)
+    with paper_scenario("scenario_1") as path:
+        result = repair(path, preset="scenario_1")
+    result.save(tmp_path, figure=False)
+    assert certify(tmp_path).ok
+
+
 def test_a_plan_from_memory_may_begin_as_far_aside_as_it_is_taken(scenarios, tmp_path):
     """It is CommonRoad's tolerance; a plan that is made here has none."""
     scene = load_scene(scenarios / "DEU_Flensburg-6_1_T-1.xml")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from repair.errors import ScenarioError, in_words
@@ -52,8 +55,7 @@ def find_scenario(name: str) -> Iterator[Path]:
     except (OSError, ValueError) as error:  # a name that is too long, or cannot be spelt
         raise ScenarioError(f"{in_words(name)} is not the name of a file: {in_words(error)}") from error
     if existing is None and name in GENERATED:
-        with _reconstruction(name) as written:
-            yield written
+        yield _reconstruction(name)
         return
     if existing is None and folder and not path.is_absolute() and not path.exists():
         raise ScenarioError(f"{name}: no such file, neither here nor in COMMONROAD_SCENARIOS={folder}")
@@ -67,8 +69,7 @@ def paper_scenario(name: str) -> Iterator[Path]:
     if folder and file and (Path(folder) / file).is_file():
         yield Path(folder) / file
         return
-    with _reconstruction(name) as written:
-        yield written
+    yield _reconstruction(name)
 
 
 @contextmanager
@@ -81,18 +82,20 @@ def reconstruction_by(checksum: str | None) -> Iterator[Path]:
         If none that this version generates has that SHA-256.
     """
     for name in PAPER_SCENARIOS:
-        with _reconstruction(name) as path:
-            if hashlib.sha256(path.read_bytes()).hexdigest() == checksum:
-                yield path
-                return
+        path = _reconstruction(name)
+        if hashlib.sha256(path.read_bytes()).hexdigest() == checksum:
+            yield path
+            return
     raise ScenarioError(
         "the result was made from a reconstruction that this version does not generate any more"
     )
 
 
-@contextmanager
-def _reconstruction(name: str) -> Iterator[Path]:
+@cache
+def _reconstruction(name: str) -> Path:
+    """It stays until the process ends: who saves a result later writes it beside that."""
     from repair.paper.synthetic import write_scenario
 
-    with tempfile.TemporaryDirectory(prefix="repair-") as aside:
-        yield write_scenario(name, Path(aside))
+    aside = tempfile.mkdtemp(prefix="repair-")
+    atexit.register(shutil.rmtree, aside, ignore_errors=True)
+    return write_scenario(name, Path(aside))
