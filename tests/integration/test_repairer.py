@@ -162,6 +162,17 @@ def test_commonroad_obstacles_are_taken_by_their_time_steps(scene):
     assert a.f_ttr == b.f_ttr
 
 
+@pytest.mark.parametrize("before, after", [(0, 0), (0, 20), (3, 20)])
+def test_who_is_known_by_one_pose_stands_in_a_cycle_too(scene, before, after):
+    poses = np.full((before + 1 + after, 3), np.nan)
+    poses[before] = (*scene.frame.to_cartesian(scene.start[:1, 0] + 25.0, np.zeros(1))[0], 0.0)
+    stands = [repair.Prediction(7, poses, 4.5, 1.8)]
+    whole = repair.repair(scene, reference=plan(scene), traffic=stands)
+    cycle = repair.Repairer(scene).update(plan(scene), traffic=stands)
+    assert (cycle.ttc, cycle.f_ttr, cycle.conflict.obstacle_id) == (whole.ttc, whole.f_ttr, 7)
+    assert any("taken to stand still" in note for note in cycle.prepared.scene.notes)
+
+
 def test_a_kept_repair_is_given_up_when_the_traffic_changes(scene):
     watch = repair.Repairer(scene, backend="casadi")
     assert watch.update(plan(scene), now=0.0).status == "found"
@@ -383,6 +394,14 @@ WRONG = {
     "no chance at all": (  # which would not be above any threshold
         lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 4.0, 2.0, probability=np.nan)]},
         ScenarioError, "its probability is nan",
+    ),
+    "a giant": (  # whose outline would fill the memory
+        lambda s: {"traffic": [repair.Prediction(3, np.zeros((9, 3)), 3e4, 3e4)]}, ScenarioError,
+        "obstacle 3: its size is",
+    ),
+    "nowhere on Earth": (
+        lambda s: {"traffic": [repair.Prediction(3, np.full((9, 3), 1e9), 4.0, 2.0)]}, ScenarioError,
+        "obstacle 3: it is farther",
     ),
     "a threshold": (lambda s: {"traffic": [], "threshold": 2.0}, ScenarioError, "from 0 to below 1"),
     "a threshold of nobody": (lambda s: {"threshold": 0.2}, ConfigError, "none is given"),

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from commonroad.geometry.shape import ShapeGroup
 from tests import roads
 
 import repair
@@ -107,6 +108,13 @@ def test_boxes_that_grow_are_sets(scene):
     stays = answer(scene, [repair.Prediction(5, poses, 4.5, 1.8)])
     assert found.search.conflict.obstacle_id == 5
     assert found.ttc < stays.ttc
+
+
+def test_sets_may_be_one_array(scene):
+    square = SQUARE + scene.frame.to_cartesian(scene.start[:1, 0] + 30.0, np.zeros(1))[0]
+    sets = np.array([square] * (scene.n_steps + 1))
+    alike = [answer(scene, [repair.Prediction(7, occupancies=form)]) for form in (sets, list(sets))]
+    assert alike[0].ttc == alike[1].ttc < np.inf
 
 
 def test_sets_of_several_parts_that_come_later(scene):
@@ -221,6 +229,12 @@ WRONG = {
     "no shape": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), shape="round")], "neither one of"),
     "sets of nobody": (lambda s: [repair.Prediction(1, occupancies=[None] * 20)], "0 of its 20 occupancies"),
     "away": (lambda s: [repair.Prediction(1, occupancies=[SQUARE, None, SQUARE])], "at step 1 it is nowhere"),
+    "a group of none": (
+        lambda s: [repair.Prediction(77, of(s, 20.0, 0.0), shape=ShapeGroup([]))], "obstacle 77: .* of none"
+    ),
+    "sets of none": (
+        lambda s: [repair.Prediction(1, occupancies=[SQUARE, ShapeGroup([])])], "obstacle 1: .* step 1 is no"
+    ),
     "a size of sets": (lambda s: [repair.Prediction(1, length=4, occupancies=[SQUARE] * 3)], "leave shape"),
     "likely": (lambda s: [repair.Prediction(1, of(s, 20.0, 0.0), 4, 2, probability=2)], "probability"),
     "twice": (lambda s: [*s.scenario.obstacles, *s.scenario.obstacles], "obstacle"),

@@ -29,7 +29,8 @@ class Prediction:
         Positive. Several predictions with one id are modes of that obstacle.
     poses : (T, 3) array or None
         ``x, y`` [m] and ``yaw`` [rad] of the obstacle's centre at the scenario's steps from the planning
-        problem's start on; rows of NaN at the beginning or the end where it is not there.
+        problem's start on; rows of NaN at the beginning or the end where it is not there. One pose alone
+        predicts nothing: the obstacle stands there, and a note says so.
     length, width : float
         Of its rectangle [m].
     occupancies : sequence, or None

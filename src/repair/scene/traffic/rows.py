@@ -12,7 +12,15 @@ from repair.errors import ScenarioError
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.shapes import FAR, Placed, polygons_of, subdivided
 
-__all__ = ["continued_from", "obstacle_of_rows", "outline_of", "repeated", "require_sane", "rigid_outline"]
+__all__ = [
+    "continued_from",
+    "obstacle_of_rows",
+    "outline_of",
+    "repeated",
+    "require_sane",
+    "require_sane_poses",
+    "rigid_outline",
+]
 
 _LARGEST = 1e4  # half size of an obstacle beyond which it is an error in the file [m]
 
@@ -167,3 +175,37 @@ def require_sane(placed: Iterable[Placed]) -> None:
             raise ScenarioError(f"its size is {2.0 * min(sizes):g} to {2.0 * max(sizes):g} m")
         if max(float(np.max(np.abs(p))) for p in places) > FAR:
             raise ScenarioError(f"it is farther than {FAR:g} m out")
+
+
+def require_sane_poses(
+    names: Sequence[int], tables: Sequence[Array], sizes: Sequence[tuple[float, float]]
+) -> None:
+    """The same of many rectangles on their way, all at once.
+
+    Parameters
+    ----------
+    names : sequence of int
+        Ids, for the sentence.
+    tables : sequence of (T, 3) array
+        Poses; NaN where one is not there.
+    sizes : sequence of (length, width)
+        [m].
+
+    Raises
+    ------
+    ScenarioError
+        The sentence names the first obstacle.
+    """
+    if not names:
+        return
+    far = np.nanmax(np.abs(np.concatenate(tables)[:, :2])) > FAR
+    if far or np.max(sizes) > 2.0 * _LARGEST:
+        for name, table, (length, width) in zip(names, tables, sizes, strict=True):
+            known = table[np.isfinite(table[:, 0])]
+            try:
+                require_sane(
+                    Placed((*pose, 0.5 * length, 0.5 * width), None, None, (*pose, 0.0))
+                    for pose in known.tolist()
+                )
+            except ScenarioError as error:
+                raise ScenarioError(f"obstacle {name}: {error}") from error

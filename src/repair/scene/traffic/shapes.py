@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
+from repair.errors import ScenarioError
 
 __all__ = [
     "FAR",
@@ -107,9 +108,18 @@ def _convex_parts(vertices: Array) -> tuple[Array, ...]:
 
 
 def _parts(shape: Any) -> list[Any]:
-    """The primitive shapes of a shape."""
+    """The primitive shapes of a shape.
+
+    Raises
+    ------
+    ScenarioError
+        If it is a group of none; the obstacle is not named.
+    """
     if hasattr(shape, "shapes"):
-        return [leaf for member in shape.shapes for leaf in _parts(member)]
+        leaves = [leaf for member in shape.shapes for leaf in _parts(member)]
+        if not leaves:
+            raise ScenarioError("its shape is a group of none")
+        return leaves
     return [shape]
 
 

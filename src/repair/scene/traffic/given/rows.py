@@ -21,7 +21,7 @@ from repair.scene.traffic.given.scenario import (
 from repair.scene.traffic.obstacle import Obstacle
 from repair.scene.traffic.obstacles import last_predicted_step, obstacles_of
 from repair.scene.traffic.prediction import Mode, Prediction, name_of, size_of
-from repair.scene.traffic.rows import outline_of
+from repair.scene.traffic.rows import outline_of, require_sane_poses
 
 __all__ = ["given_obstacles"]
 
@@ -65,26 +65,32 @@ def given_obstacles(
     if hasattr(traffic, "__iter__") and not isinstance(traffic, str | bytes):
         things = list(traffic)
     plain = after_prediction == "remove" and isinstance(things, list)
-    if not plain or not all(isinstance(p, Prediction) and p.occupancies is p.shape is None for p in things):
-        scenario, modes, notes = given_scenario(old, first_step, things, threshold)
-        last = last_predicted_step(scenario)
-        ends = last is not None and last > first_step and after_prediction == "remove"
-        n_steps = min(last - first_step, steps_max) if ends and last is not None else steps_max
-        found, _, more = obstacles_of(
-            scenario, first_step=first_step, n_steps=n_steps, after_prediction=after_prediction
-        )
-        return found, n_steps, modes, [*notes, *more]
-    require_threshold(threshold)
-    chosen, modes, notes = standing_as(things, threshold, set())
-    for _, one in chosen:
-        require_kind(one.kind, name_of(one))
-    rows = [
-        _Row(name, one, size_of(one), table)
-        for (name, one), table in zip(chosen, _tables(chosen), strict=True)
-    ]
-    longest = max((len(row.table) for row in rows), default=0) - 1
-    n_steps = min(longest, steps_max) if longest > 0 else steps_max
-    return _of_tables(rows, n_steps, float(old.dt)), n_steps, modes, notes
+    if plain and all(isinstance(p, Prediction) and p.occupancies is p.shape is None for p in things):
+        require_threshold(threshold)
+        chosen, modes, notes = standing_as(things, threshold, set())
+        for _, one in chosen:
+            require_kind(one.kind, name_of(one))
+        rows = [
+            _Row(name, one, size_of(one), table)
+            for (name, one), table in zip(chosen, _tables(chosen), strict=True)
+        ]
+        if all(_moves(row.table) for row in rows):
+            longest = max((len(row.table) for row in rows), default=0) - 1
+            n_steps = min(longest, steps_max) if longest > 0 else steps_max
+            return _of_tables(rows, n_steps, float(old.dt)), n_steps, modes, notes
+    scenario, modes, notes = given_scenario(old, first_step, things, threshold)
+    last = last_predicted_step(scenario)
+    ends = last is not None and last > first_step and after_prediction == "remove"
+    n_steps = min(last - first_step, steps_max) if ends and last is not None else steps_max
+    found, _, more = obstacles_of(
+        scenario, first_step=first_step, n_steps=n_steps, after_prediction=after_prediction
+    )
+    return found, n_steps, modes, [*notes, *more]
+
+
+def _moves(table: Array) -> bool:
+    """Whether poses that end with a known one say more than where somebody stands."""
+    return len(table) > 1 and bool(np.isfinite(table[-2]).all())
 
 
 class _Row(NamedTuple):
@@ -129,6 +135,7 @@ def _table_of(prediction: Prediction) -> Array:
 
 def _of_tables(rows: list[_Row], n_steps: int, dt: float) -> tuple[Obstacle, ...]:
     """Obstacles of poses (T, 3) each, all at once: there are dozens of them every cycle."""
+    require_sane_poses([row.id for row in rows], [row.table for row in rows], [row.size for row in rows])
     longest = max((len(row.table) for row in rows), default=0)
     poses = np.full((len(rows), max(longest, n_steps + 1), 3), np.nan)
     for place, row in zip(poses, rows, strict=True):

@@ -67,7 +67,8 @@ def sets_of(prediction: Prediction, what: str) -> tuple[int, list[Any]]:
     ScenarioError
         If one is none, it is away in between, or there are fewer than two; the sentence names the first step.
     """
-    made = [_set(given, k, what) for k, given in enumerate(prediction.occupancies or ())]
+    given = () if prediction.occupancies is None else prediction.occupancies
+    made = [_set(one, k, what) for k, one in enumerate(given)]
     there = [k for k, shape in enumerate(made) if shape is not None]
     if len(there) < 2:
         raise ScenarioError(
@@ -85,7 +86,7 @@ def _set(given: Any, step: int, what: str) -> Any:
     """One set: a CommonRoad shape, a polygon (V, 2), or several of them; None where it is not there."""
     from commonroad.geometry.shape import Polygon, Shape, ShapeGroup
 
-    if given is None or isinstance(given, Shape):
+    if given is None or (isinstance(given, Shape) and getattr(given, "shapes", True)):
         return given
     outline = _outline(given)
     if outline is not None:
