@@ -175,7 +175,7 @@ WRONG = {
     "two columns": (lambda v: v[:, :2], "of shape"),
     "three samples": (lambda v: v[:3], "at least 4"),
     "a hole in time": (lambda v: np.delete(v, slice(20, 26), axis=0), "gap: from t = 0.475"),
-    "far apart": (lambda v: v[::28], "gap: from t = 0 to 0.7"),
+    "far apart": (lambda v: v[::28], "mostly one sample every 0.7 s"),
     "backwards": (lambda v: v[[0, 1, 2, 2, 4, 5]], "do not go on"),
     "later": (lambda v: v[8:], "begins at t = 0.2"),
     "no number": (shifted(1, np.nan, slice(12, 13)), "x of sample 12 is not finite"),
@@ -188,6 +188,15 @@ WRONG = {
     "one heading": (shifted(3, 0.5, slice(61, 62)), "at time step 6"),
     "a speed of its own": (shifted(4, 30.0, slice(60, 70)), "speed"),
 }
+
+
+def test_who_turns_back_is_told_so(scene):
+    ego = scene.initial_state
+    t = np.arange(0.0, 6.01, 0.1)
+    way = ego.velocity * t - 2.0 * t**2  # forwards until 2.5 s
+    x, y = ego.x + way * np.cos(ego.orientation), ego.y + way * np.sin(ego.orientation)
+    with pytest.raises(ReferenceTrajectoryError, match=r"turns back at time step (2[5-9]|3[0-5])"):
+        repair.repair(scene, reference=np.column_stack([t, x, y]))
 
 
 @pytest.mark.parametrize("what", WRONG)

@@ -100,8 +100,12 @@ def require_times(t: Array, dt: float) -> None:
         raise ReferenceTrajectoryError(
             f"{WHAT}: after t = {t[k]:g} s its times do not go on (sample {k + 1} is at {t[k + 1]:g} s)"
         )
-    usual = float(np.median(steps))
-    wide = steps > min(_GAP * usual, max(_COARSEST, dt)) + _SAME
+    usual, most = float(np.median(steps)), max(_COARSEST, dt)
+    if usual > most + _SAME:
+        raise ReferenceTrajectoryError(
+            f"{WHAT} has mostly one sample every {usual:.3g} s; they may be at most {most:g} s apart"
+        )
+    wide = steps > min(_GAP * usual, most) + _SAME
     if wide.any():
         k = int(np.argmax(wide))
         raise ReferenceTrajectoryError(

@@ -66,8 +66,13 @@ def fit_recording(
     if coordinates is None:
         coordinates = along(scene.frame, positions, float(scene.start[0, 0]))
     if not np.isfinite(coordinates).all():
+        step = recording.first + int(np.argmin(np.isfinite(coordinates).all(axis=1)))
+        back = _back(positions)
         raise ReferenceTrajectoryError(
-            f"{what} leaves the neighbourhood of the route and cannot be a reference"
+            f"{what} leaves the neighbourhood of the route at time step {step} and cannot be a reference"
+            if back is None
+            else f"{what} turns back at time step {recording.first + back}, over its own path; it can be "
+            "driven forwards or in reverse, but not one after the other"
         )
     if recording.velocities is None:
         smooth = _smooth(scene, recording, coordinates, noisy=noisy)[0]
@@ -88,6 +93,18 @@ def fit_recording(
         if then > first or (rough and then == first):
             return smooth
     return exact
+
+
+def _back(positions: Array) -> int | None:
+    """Index of the first position that lies back from the ones before, by more than noise; or None."""
+    last, ahead = positions[0], np.zeros(2)
+    for k, point in enumerate(positions):
+        moved = point - last
+        if np.hypot(*moved) >= _DENSE:
+            if float(moved @ ahead) < 0.0:
+                return k
+            last, ahead = point, moved
+    return None
 
 
 def _hermite(scene: Scene, coordinates: Array, velocities: Array) -> BernsteinCurve:

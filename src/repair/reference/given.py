@@ -119,7 +119,8 @@ def given_reference(thing: Any, scene: Scene) -> GivenReference:
 
         ``t`` is in seconds from the planning problem's start and begins with 0; ``x, y`` are of the
         vehicle's centre [m], ``yaw`` is the orientation of its body or the direction of its path [rad], ``v``
-        its speed [m/s]. Samples need not be evenly spaced nor lie at the scenario's steps.
+        its speed [m/s]. Samples need not be evenly spaced nor lie at the scenario's steps, but are nowhere
+        more than 1.5 times as far apart as mostly, nor more than 0.5 s or a step of the scenario.
     scene : Scene
 
     Returns
