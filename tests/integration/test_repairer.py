@@ -433,11 +433,20 @@ def test_what_is_wrong_is_a_sentence_and_no_end(what, scene):
         (None, {"backend": "foo"}, "foo"),
         (None, {"planning_problem": 3}, "belongs to a CommonRoad scenario"),
         (None, {"overrides": ["driver=at_ttr"]}, "driver=at_ttr"),
+        (None, {"overrides": ["scene.vehicle=2"]}, "loaded with scene.vehicle=1"),
+        (None, {"overrides": ["scene.after_prediction=hold"]}, "loaded with scene.after_prediction=remove"),
     ],
 )
 def test_what_no_repairer_is_made_of(road, keys, words, scene):
     with pytest.raises(RepairError, match=words):
         repair.Repairer(scene if road is None else road, **keys)
+
+
+def test_what_belongs_to_no_cycle_is_said(scene):
+    wanted = ["metrics=[ttb]", "bound.wanted=true", "repair.goal=true"]
+    cycle = repair.Repairer(scene, overrides=wanted).update(plan(scene))
+    told = [note.split()[0] for note in cycle.prepared.notes if "no effect in a Repairer" in note]
+    assert told == [key.split("=")[0] for key in wanted]
 
 
 def test_a_curve_is_no_plan(scene):

@@ -1,4 +1,4 @@
-"""Whoever may be asked in a cycle is there before the first one."""
+"""Before the first cycle: who may be asked is there, and what nobody will ask is known."""
 
 from __future__ import annotations
 
@@ -6,11 +6,25 @@ from contextlib import suppress
 
 from repair.api import make
 from repair.backend.base import RepairBackend
-from repair.config.schema import Config
+from repair.config.schema import Config, values_of
 from repair.errors import BackendError
 from repair.vehicle.commonroad_ks import load_official
 
-__all__ = ["made_ready"]
+__all__ = ["made_ready", "not_asked"]
+
+_NOT_ASKED = (
+    "metrics", "bound.wanted", "explain.wanted", "mitigation.wanted", "repair.goal", "repair.rejoin",
+)  # fmt: skip
+
+
+def not_asked(config: Config) -> tuple[str, ...]:
+    """Notes of what is wanted and belongs to no cycle."""
+    values = values_of(config)
+    return tuple(
+        f"{key} has no effect in a Repairer; repair.repair with the same plan looks at it"
+        for key in _NOT_ASKED
+        if values[key]
+    )
 
 
 def made_ready(config: Config) -> RepairBackend:

@@ -18,15 +18,16 @@ from repair.api import find
 from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
+from repair.config.agreed import agreed_with
 from repair.config.load import load_config
-from repair.config.schema import Config
+from repair.config.schema import Config, require_types
 from repair.curves.base import Curve, SplicedCurve, is_curve
 from repair.cycle.asked import Asked, Others, require_deadline, since, spare, step_of
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
 from repair.cycle.kept import KeptRepair, verified_again
 from repair.cycle.paced import LEAST, Pace, Paced
-from repair.cycle.ready import made_ready
+from repair.cycle.ready import made_ready, not_asked
 from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
@@ -58,7 +59,8 @@ class Repairer:
     road : Scene, path, or CommonRoad scenario
         Where it is driven, with a planning problem: its goal says which way the road goes on.
     config : Config, optional
-        See :func:`repair.load_config`; ``reference`` in it is not looked at.
+        See :func:`repair.load_config`; ``reference`` in it is not looked at. What it wants beside the search
+        (metrics, bound, explanation, mitigation, the way on) belongs to no cycle, and a note says so.
     planning_problem : optional
         With a CommonRoad scenario: the planning problem.
     **keys
@@ -67,7 +69,7 @@ class Repairer:
     Raises
     ------
     RepairError
-        If road or configuration cannot be used.
+        If road or configuration cannot be used, or a scene was loaded with other settings.
     """
 
     def __init__(
@@ -80,15 +82,18 @@ class Repairer:
             raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
         if config.driver != "f_ttr":
             raise ConfigError(f"a Repairer searches for the F-TTR; driver={config.driver} has no effect here")
+        require_types(config)
+        self.scene = scene_of(road, planning_problem, config)
+        config = agreed_with(config, self.scene)
         source = replace(config, reference=replace(config.reference, source="given"))
         source.given = config.given - {"reference.source"}
         self.config = source
-        self.scene = scene_of(road, planning_problem, config)
         self._first = self.scene
         self._start_with(source)
 
     def _start_with(self, config: Config) -> None:
         """What is made on the way."""
+        self._notes = not_asked(config)
         self._lanes: Mapping[int, Lane] | None = None
         self._backend = made_ready(config)
         self._paces: dict[str, Pace] = {}
@@ -231,6 +236,7 @@ class Repairer:
                 scene = scene_now(
                     self.scene, self._first, asked.step, state, others.traffic, others.threshold
                 )
+                scene = replace(scene, notes=(*scene.notes, *self._notes))
             with phases("given"):
                 given = given_reference(reference, scene)
         before = self._framed
