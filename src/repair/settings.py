@@ -16,7 +16,7 @@ from repair.errors import ConfigError, in_words
 
 __all__ = ["Key", "Setting", "keys_of", "require_sane", "require_type", "setting"]
 
-_ELEMENT = 50.0  # a list of numbers holds none of larger size: margins [m]
+_ELEMENT = 50.0  # a list of numbers holds none of larger size, unless it says so
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Setting:
     says : str
         The meaning, in words, with the unit.
     low, high : float or None
-        Smallest and largest value, both allowed.
+        Smallest and largest value, both allowed; of a list, those of each of its numbers.
     choices : tuple of str or None
         The words that are possible.
     registry : str or None
@@ -157,8 +157,10 @@ def require_sane(key: Key, value: Any, words: Sequence[str] | None) -> None:
         raise ConfigError(f"{named} {value}; it must be a finite number")
     # OmegaConf lets a list stand for a number inside of a list.
     if isinstance(value, list) and "float" in key.type:
-        if not all(isinstance(v, float) and abs(v) <= _ELEMENT for v in value):
-            raise ConfigError(f"{named} {value}; it must be numbers from {-_ELEMENT:g} to {_ELEMENT:g}")
+        low = -_ELEMENT if known.low is None else known.low
+        high = _ELEMENT if known.high is None else known.high
+        if not all(isinstance(v, float) and low <= v <= high for v in value):
+            raise ConfigError(f"{named} {value}; it must be numbers from {low:g} to {high:g}")
         return
     low = -float("inf") if known.low is None else known.low
     high = float("inf") if known.high is None else known.high

@@ -344,6 +344,8 @@ def test_what_each_mode_alone_would_allow(scene):
     assert likely.ttc == far.ttc
     assert [mode.name for mode in watch.modes(likely)] == ["40 m"]
     assert watch.modes(watch.update(plan(scene))) == ()
+    with pytest.raises(ConfigError, match="not of a int"):
+        watch.modes(5)
 
 
 def test_numbers_of_numpy_are_numbers(scene):

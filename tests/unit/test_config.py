@@ -57,8 +57,8 @@ def test_every_key_is_a_value_of_the_configuration_with_its_default_in_range():
         assert KEYS[name].default is None or set(listed(KEYS[name].default)) <= set(words), name
     for name, (low, high) in RANGES.items():
         default = KEYS[name].default
-        assert default is None or low <= default <= high, name
-        assert KEYS[name].type.split(" or ")[0] in ("int", "float"), name
+        assert default is None or all(low <= one <= high for one in listed(default)), name
+        assert KEYS[name].type.split(" or ")[0] in ("int", "float", "list[float]"), name
     for key in KEYS.values():
         needed = key.setting.only_with
         assert needed is None or needed[0] in KEYS
@@ -92,11 +92,12 @@ def test_every_choice_is_accepted_and_another_word_refused(key):
 def test_every_range_is_closed(key):
     low, high = RANGES[key]
     kind = int if KEYS[key].type.startswith("int") else float
+    several = KEYS[key].type.startswith("list")
     for value in (low, high):
-        shown = int(value) if kind is int else value
-        assert value_of(load_config(overrides={key: shown}), key) == pytest.approx(value)
+        shown = [float(value)] if several else kind(value)
+        assert listed(value_of(load_config(overrides={key: shown}), key)) == [pytest.approx(value)]
     for value in (low - 1, high + 1):
-        shown = int(value) if kind is int else value
+        shown = [float(value)] if several else kind(value)
         with pytest.raises(ConfigError, match=f"'{key}'"):
             load_config(overrides={key: shown})
 
@@ -176,6 +177,9 @@ def test_numbers_of_numpy_are_checked_like_any_other():
         ("search.delta_t=-1", "'search.delta_t'.*-1"),
         ("search.delta_t=0", "'search.delta_t'"),
         ("search.delta_t=nan", "'search.delta_t'.*finite"),
+        ("repair.ease=[0.1,2]", "'repair.ease'.*numbers from 0 to 0.9"),
+        ("repair.widen=[-1]", "'repair.widen'.*numbers from 0 to 50"),
+        ("repair.relax=[-60]", "'repair.relax'.*numbers from -50 to 50"),
         ("search.upper=inf", "'search.upper'.*finite"),
         ("repair.degree=3.5", "'repair.degree'"),
         ("repair.degree=2", "'repair.degree'"),

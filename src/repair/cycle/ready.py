@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 from repair.api import make
 from repair.backend.base import RepairBackend
-from repair.config.schema import Config, values_of
-from repair.errors import BackendError
+from repair.config.load import load_config
+from repair.config.schema import Config, require_types, values_of
+from repair.errors import BackendError, ConfigError, kind_of
 from repair.vehicle.commonroad_ks import load_official
 
-__all__ = ["made_ready", "not_asked"]
+__all__ = ["configured", "made_ready", "not_asked"]
 
 _NOT_ASKED = (
     "metrics", "bound.wanted", "explain.wanted", "mitigation.wanted", "repair.goal", "repair.rejoin",
 )  # fmt: skip
+
+
+def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
+    """The configuration of a Repairer, given as one or by its keys.
+
+    Raises
+    ------
+    ConfigError
+        If it is both, none, or no search for the F-TTR.
+    """
+    if config is not None and keys:
+        raise ConfigError("give either a config or configuration keys, not both")
+    config = load_config(**keys) if config is None else config
+    if not isinstance(config, Config):
+        raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
+    if config.driver != "f_ttr":
+        raise ConfigError(f"a Repairer searches for the F-TTR; driver={config.driver} has no effect here")
+    require_types(config)
+    return config
 
 
 def not_asked(config: Config) -> tuple[str, ...]:

@@ -19,15 +19,14 @@ from repair.arrays import Array
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict
 from repair.config.agreed import agreed_with
-from repair.config.load import load_config
-from repair.config.schema import Config, require_types
+from repair.config.schema import Config
 from repair.curves.base import Curve, SplicedCurve, is_curve
 from repair.cycle.asked import Asked, Others, require_deadline, since, spare, step_of
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
 from repair.cycle.kept import KeptRepair, verified_again
 from repair.cycle.paced import LEAST, Pace, Paced
-from repair.cycle.ready import made_ready, not_asked
+from repair.cycle.ready import configured, made_ready, not_asked
 from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
@@ -75,14 +74,7 @@ class Repairer:
     def __init__(
         self, road: Any, config: Config | None = None, *, planning_problem: Any = None, **keys: Any
     ) -> None:
-        if config is not None and keys:
-            raise ConfigError("give either a config or configuration keys, not both")
-        config = load_config(**keys) if config is None else config
-        if not isinstance(config, Config):
-            raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
-        if config.driver != "f_ttr":
-            raise ConfigError(f"a Repairer searches for the F-TTR; driver={config.driver} has no effect here")
-        require_types(config)
+        config = configured(config, keys)
         self.scene = scene_of(road, planning_problem, config)
         config = agreed_with(config, self.scene)
         source = replace(config, reference=replace(config.reference, source="given"))
@@ -129,7 +121,14 @@ class Repairer:
         -------
         tuple of ModeResult
             None is below the F-TTR of the cycle, which serves all of them; empty where nobody has several.
+
+        Raises
+        ------
+        ConfigError
+            If that is no cycle.
         """
+        if not isinstance(cycle, Cycle):
+            raise ConfigError(f"modes are those of a cycle that update has answered, not of {kind_of(cycle)}")
         if cycle.prepared is None:
             return ()
         prepared = cycle.prepared

@@ -63,16 +63,22 @@ class RepairConfig:
         factory=lambda: [0.3, 0.6],
         # A box in (s, l) is narrower than the vehicle in a bend or at an angle to the path.
         says="what is added to margin and clearance [m], one after the other, where a curve came too close",
+        low=0.0,
+        high=50.0,
     )
     narrow: list[float] = setting(
         factory=lambda: [0.1, 0.3, 0.6],
         # The corners of a vehicle at an angle to the road are nearer to its edge than half the width.
         says="by what the road is narrowed [m], one after the other, where a curve left it",
+        low=0.0,
+        high=50.0,
     )
     ease: list[float] = setting(
         factory=lambda: [0.05, 0.1, 0.2],
         # Soft limits are exceeded a little where they matter most.
         says="share of the acceleration limits left unused, one after the other, where a curve exceeded them",
+        low=0.0,
+        high=0.9,
     )
     lateral: str = setting(
         "road",

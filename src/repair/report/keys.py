@@ -27,14 +27,14 @@ def _shown(value: Any) -> str:
 
 def _possible(key: Key) -> str:
     words, known = words_of(key), key.setting
+    several = "list of " if key.type.startswith("list") else ""
     if words is not None:
         listed = ", ".join(f"`{word}`" for word in words)
         or_null = " or null" if key.type.endswith("null") else ""
-        several = "list of " if key.type.startswith("list") else ""
         return f"{several}{listed or 'registered names'}{or_null}"
     if known.low is None or known.high is None:
         return key.type
-    return f"{known.low:g} to {known.high:g}" + (" or null" if key.type.endswith("null") else "")
+    return f"{several}{known.low:g} to {known.high:g}" + (" or null" if key.type.endswith("null") else "")
 
 
 def preset_summary(name: str) -> str:
