@@ -399,6 +399,8 @@ def filmed(out: Path, capsys) -> None:
         (["scenario_1", "--policy", "f_ttr", "--set", "simulate.ttc=1.0"], "simulate.ttc has no effect"),
         (["scenario_1", "--set", "simulate.trigger=smoke"], "it must be one of contact, margin"),
         (["scenario_1", "--set", "driver=at_ttr"], "driver=at_ttr has no effect in it"),
+        (["scenario_1", "--set", "metrics=[ttb]"], "metrics has no effect in a simulation"),
+        (["scenario_1", "--set", "repair.goal=true"], "repair.goal has no effect in a simulation"),
         (["nowhere.xml"], "nowhere.xml"),
     ],
 )

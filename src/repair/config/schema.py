@@ -26,10 +26,12 @@ from repair.settings import Key, keys_of, require_type, setting
 from repair.solvers.registry import BACKENDS, backend_names, fallbacks_of, sections
 
 __all__ = [
-    "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "words_of",
+    "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "wanted_beside",
+    "words_of",
 ]  # fmt: skip
 
 _REGISTRIES: Mapping[str, Registry[Any]] = {r.kind: r for r in (BACKENDS, CHECKS, METRICS, RULES, SOURCES)}
+_BESIDE = ("metrics", "bound.wanted", "explain.wanted", "mitigation.wanted", "repair.goal", "repair.rejoin")
 
 
 @dataclass
@@ -215,6 +217,12 @@ def words_of(key: Key) -> tuple[str, ...] | None:
 def values_of(config: Config) -> dict[str, Any]:
     """All values by dotted key."""
     return {key.name: reduce(getattr, key.name.split("."), config) for key in _keys()}
+
+
+def wanted_beside(config: Config) -> list[str]:
+    """Keys by which something is wanted beside the search, which cycles do not look at."""
+    values = values_of(config)
+    return [key for key in _BESIDE if values[key]]
 
 
 def require_types(config: Config) -> None:

@@ -9,15 +9,11 @@ from typing import Any
 from repair.api import make
 from repair.backend.base import RepairBackend
 from repair.config.load import load_config
-from repair.config.schema import Config, require_types, values_of
+from repair.config.schema import Config, require_types, wanted_beside
 from repair.errors import BackendError, ConfigError, kind_of
 from repair.vehicle.commonroad_ks import load_official
 
 __all__ = ["configured", "made_ready", "not_asked"]
-
-_NOT_ASKED = (
-    "metrics", "bound.wanted", "explain.wanted", "mitigation.wanted", "repair.goal", "repair.rejoin",
-)  # fmt: skip
 
 
 def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
@@ -41,11 +37,9 @@ def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
 
 def not_asked(config: Config) -> tuple[str, ...]:
     """Notes of what is wanted and belongs to no cycle."""
-    values = values_of(config)
     return tuple(
         f"{key} has no effect in a Repairer; repair.repair with the same plan looks at it"
-        for key in _NOT_ASKED
-        if values[key]
+        for key in wanted_beside(config)
     )
 
 

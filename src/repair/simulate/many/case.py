@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from repair.config.load import load_config
-from repair.config.schema import Config
+from repair.config.schema import Config, wanted_beside
 from repair.curves.base import Curve
 from repair.errors import ConfigError
 from repair.preparation import Prepared, among, prepare
@@ -53,6 +53,8 @@ def simulation_config(
     config = load_config(preset, file, overrides, **named) if not usual else _over(asked, usual)
     if config.driver != "f_ttr":
         raise ConfigError(f"a simulation searches for the F-TTR; driver={config.driver} has no effect in it")
+    if beside := wanted_beside(config):
+        raise ConfigError(f"{beside[0]} has no effect in a simulation, whose cycles look at the search alone")
     wrong = [a for a in config.simulate.gentle if a <= 0.0]
     if wrong:
         raise ConfigError(f"simulate.gentle holds {wrong[0]:g} m/s²; friction limits are positive")
