@@ -5,8 +5,8 @@
 # manoeuvre vectors from which the OpenSCENARIO file is written.
 # What happens: alone, each is found. Of the two, only the one to the right is: the car of the scenario that is written moves over to the
 # right from the right lane. Of three, left, right, left, only the first, or in one of 24
-# directions of the road on the map the second. The lane line's and the track's intersections are all computed, and the first in the list is taken; the list's
-# order is the geometry library's.
+# directions of the road on the map the second. The intersections of the lane line and the track are all computed, and the first in
+# the list is taken; the list's order is the geometry library's.
 # Why it matters: the line between two lanes is one line in the input; cut-ins with a return, overtaking and weaving are what such
 # scenarios are made for.
 #
