@@ -499,6 +499,14 @@ def test_what_a_file_sets_for_another_source_may_stand_there(tmp_path):
         (["backend=shooting", "qptr.spacing=0.5"], [("qptr.spacing", "backend", "shooting")]),
         (["backend=qptr", "ego.deform.smooth=3"], []),  # it may have to find what qptr does not
         (["backend=qptr", "ego.deform.smooth=3", "fallback=[]"], [("ego.deform.smooth", "backend", "qptr")]),
+        (["bound.nodes=9"], [("bound.nodes", "bound.wanted", "False")]),
+        (["bound.nodes=9", "mitigation.wanted=true"], []),  # which asks for the bound of the vehicle
+        (["bound.nodes=9", "explain.wanted=true"], []),
+        (["bound.nodes=9", "backend=portfolio", "portfolio.bound=true"], []),
+        (
+            ["bound.kinds=[search]", "mitigation.wanted=true"],
+            [("bound.kinds", "bound.wanted", "False")],
+        ),
         (["ego.precondition=false"], [("ego.precondition", "ego.solver", "newton")]),
         (["ego.precondition=false", "ego.solver=lbfgs"], []),
         (

@@ -100,6 +100,8 @@ class Config:
         values = values_of(self)
         for key in _keys():
             needed = key.setting.only_with
+            if key.name.startswith("bound.") and key.name != "bound.kinds" and self._proves():
+                continue
             if key.name in self.given and needed is not None and values[needed[0]] not in needed[1]:
                 yield key.name, needed[0], str(values[needed[0]])
         for key in _keys():
@@ -110,6 +112,11 @@ class Config:
                 yield key.name, "metrics", "[]"
             if key.name in self.given and owner == "simulate":
                 yield key.name, "command", "run"
+
+    def _proves(self) -> bool:
+        """Whether somebody asks for proofs, also of kinds that ``bound.kinds`` does not name."""
+        others = "portfolio" in self._asked() and self.section("portfolio").bound
+        return bool(self.bound.wanted or self.mitigation.wanted or self.explain.wanted or others)
 
     def _asked(self) -> set[str]:
         """Names of all backends that may have a say."""

@@ -53,7 +53,7 @@ def simulation_config(
     config = load_config(preset, file, overrides, **named) if not usual else _over(asked, usual)
     if config.driver != "f_ttr":
         raise ConfigError(f"a simulation searches for the F-TTR; driver={config.driver} has no effect in it")
-    if beside := wanted_beside(config):
+    if beside := [key for key in wanted_beside(config) if key in config.given]:
         raise ConfigError(f"{beside[0]} has no effect in a simulation, whose cycles look at the search alone")
     wrong = [a for a in config.simulate.gentle if a <= 0.0]
     if wrong:
