@@ -341,6 +341,37 @@ def test_a_repair_that_brakes_late_is_followed_as_it_is(backend, tmp_path):
     assert again.conflict.kind == "none"
 
 
+@pytest.mark.parametrize(
+    "samples, turns_from, brakes_from",
+    [(41, 99, 5), (41, 99, 15), (40, 7, 12)],
+    ids=["soon", "late", "out of a swerve"],
+)
+def test_a_plan_near_the_grip_is_followed_as_it_is(samples, turns_from, brakes_from, tmp_path):
+    """Braking with 10 m/s² begins at once, and so does each turn of the steering wheel, at 0.3 rad/s."""
+    file = tmp_path / "ZAM_Test-1_1_T-1.xml"
+    file.write_text(
+        roads.scenario(
+            road=roads.lanelet(1, range(0, 401, 20), [0.0] * 21, width=30.0),
+            obstacles=roads.driving(30, 300.0, 0.0, 1.0),
+            problems=roads.problem(100, roads.state(20.0, 0.0, v=12.0)),
+        ),
+        encoding="utf-8",
+    )
+    scene = repair.load_scene(file)
+    rear, wheelbase, h = scene.vehicle.rear, scene.vehicle.wheelbase, scene.dt / 50
+    x, y, psi, delta, v, plan = 20.0 - rear, 0.0, 0.0, 0.0, 12.0, []
+    for k in range(samples):
+        plan.append((k * scene.dt, x + rear * np.cos(psi), y + rear * np.sin(psi), psi, v))
+        part = (k - turns_from) // 3
+        for _ in range(50):
+            delta += h * 0.3 * ({0: 1.0, 1: -1.0, 2: -1.0, 3: 1.0}.get(part, 0.0))
+            psi += h * v / wheelbase * np.tan(delta)
+            before, v = v, max(v - h * 10.0 * (k >= brakes_from), 0.0)
+            way = h * 0.5 * (before + v)
+            x, y = x + way * np.cos(psi), y + way * np.sin(psi)
+    assert repair.prepare(scene, repair.load_config(), reference=plan).conflict.kind == "none"
+
+
 @pytest.mark.parametrize("speed", [0.012, 0.1, 0.4])
 def test_who_crawls_stands_as_the_plan_says(speed, tmp_path):
     """The bends of a path of centimetres would turn the body by more than a radian."""

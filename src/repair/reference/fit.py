@@ -18,6 +18,7 @@ from repair.scene.road.passes import along
 from repair.scene.start import slip_at_start
 
 if TYPE_CHECKING:
+    from repair.curves.plane import CartesianPath
     from repair.reference.consistency import Recording
     from repair.scene.scene import Scene
 
@@ -76,14 +77,11 @@ def fit_recording(
         )
     if recording.velocities is None:
         smooth = _smooth(scene, recording, coordinates, noisy=noisy)[0]
-        if (
-            noisy
-            or not _swings(scene, smooth)
-            or not np.isfinite([recording.speeds, recording.headings]).all()
-        ):
+        told = np.isfinite([recording.speeds, recording.headings]).all()
+        if noisy or not told or not _swings(scene, smooth):
             return smooth
         exact = _hermite(scene, coordinates, _by_the_body(recording, scene.dt))
-        return exact if _drivable_until(scene, exact) > _drivable_until(scene, smooth) else smooth
+        return exact if _drivable_until(scene, exact) >= _drivable_until(scene, smooth) else smooth
     exact = _hermite(scene, coordinates, recording.velocities)
     first = _drivable_until(scene, exact)
     rough = _roughness(exact) > _ROUGH
@@ -113,14 +111,21 @@ def _hermite(scene: Scene, coordinates: Array, velocities: Array) -> BernsteinCu
 
 
 def _swings(scene: Scene, smooth: UniformBSpline) -> bool:
-    """Whether a spline may need more grip along the path than there is, as it does around a jump of it."""
-    return bool(np.abs(smooth.derivative_points(2)[:, 0]).max() > scene.vehicle.a_max)
+    """Whether a spline may need more grip than there is, as it does around a jump of what is needed."""
+    along_it = np.abs(smooth.derivative_points(2)[:, 0]).max()
+    return bool(along_it > scene.vehicle.a_max) or _slides(scene, *_looked_at(scene, smooth)) < np.inf
 
 
 def _by_the_body(recording: Recording, dt: float) -> Array:
-    """Velocities (K, 2) of the centre [m/s], by the speed, heading and turning of the body."""
+    """Velocities (K, 2) of the centre [m/s], by the speed, heading and turning of the body.
+
+    The turning is that of a cubic spline: differences smear it where the steering's rate jumps.
+    """
+    from scipy.interpolate import CubicSpline
+
     heading = np.unwrap(recording.headings)
-    across = recording.rear * np.gradient(heading, dt, edge_order=2)
+    times = np.arange(len(heading)) * dt
+    across = recording.rear * CubicSpline(times, heading)(times, 1)
     cos, sin = np.cos(heading), np.sin(heading)
     x, y = recording.speeds * cos - across * sin, recording.speeds * sin + across * cos
     return np.stack([x, y], axis=1)
@@ -194,19 +199,29 @@ def _orientation(scene: Scene, curve: Curve, count: int) -> Array:
 
 def _drivable_until(scene: Scene, curve: Curve) -> float:
     """When the scene's vehicle leaves a curve because it cannot drive it, or has not the grip [s]; or inf."""
-    steps = round((curve.t_end - curve.t_start) / scene.dt)
-    times = np.arange(steps * _PARTS + 1) * (scene.dt / _PARTS)
-    path = scene.frame.cartesian(curve.sample(times))
+    times, path = _looked_at(scene, curve)
     slip, orientation = scene.model.angles(path, slip_at_start(scene, path))
     found = scene.model.first_undrivable(
         times[::_PARTS], path.xy[::_PARTS], path.speed[::_PARTS], slip[::_PARTS], orientation[::_PARTS],
         scene.dt, "leftover", np.inf,
     )  # fmt: skip
+    until = _slides(scene, times, path)
+    return until if found is None else min(found[0], until)
+
+
+def _looked_at(scene: Scene, curve: Curve) -> tuple[Array, CartesianPath]:
+    """Times at which a curve is looked at [s], several to a step, and the path there."""
+    steps = round((curve.t_end - curve.t_start) / scene.dt)
+    times = np.arange(steps * _PARTS + 1) * (scene.dt / _PARTS)
+    return times, scene.frame.cartesian(curve.sample(times))
+
+
+def _slides(scene: Scene, times: Array, path: CartesianPath) -> float:
+    """When a path needs more grip than there is [s]; or inf."""
     velocity = path.speed[:, None] * np.stack([np.cos(path.heading), np.sin(path.heading)], axis=1)
     grip = np.hypot(*np.diff(velocity, axis=0).T) * (_PARTS / scene.dt)
     slides = np.flatnonzero(grip > scene.vehicle.a_max)
-    until = float(times[slides[0]]) if len(slides) else np.inf
-    return until if found is None else min(found[0], until)
+    return float(times[slides[0]]) if len(slides) else np.inf
 
 
 def _smooth(
