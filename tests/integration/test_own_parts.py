@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -70,6 +71,11 @@ def test_who_is_no_planner_and_who_fails():
     planner = repair.RepairingPlanner(Idle())  # whose answer is not to be another's reference
     with pytest.raises(ReferenceTrajectoryError, match="Idle has planned nothing"):
         planner.plan(None, None)
+    planner = repair.RepairingPlanner(SimpleNamespace(plan=lambda *asked: "constant"))
+    with pytest.raises(ReferenceTrajectoryError, match="planned a str, which is no trajectory"):
+        planner.plan(None, None)
+    with pytest.raises(ConfigError, match="load_config, and is a int"):
+        repair.RepairingPlanner(Failing(), 5)
 
 
 class Idle:

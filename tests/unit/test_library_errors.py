@@ -159,6 +159,8 @@ def test_overrides_of_a_wrong_type(thing):
 def test_other_arguments(scene, tmp_path):
     assert "cannot be read" in refused(lambda: load_config(file=tmp_path))
     assert "on_probe" in refused(lambda: repair.repair(scene, on_probe=5))
+    found = repair.repair(scene, overrides=["reference.source=constant"])
+    assert "a FigureStyle, not a str" in refused(lambda: found.save(tmp_path / "out", figure="pdf"))
     refused(lambda: load_config(overrides=["backend=${nowhere}"]))
     config = load_config()
     for broken in (replace(config, backend=[]), replace(config, scene=5), replace(config, metrics="ttr")):

@@ -11,7 +11,7 @@ from repair.backend.base import Capabilities
 from repair.bounds.latest import Bound
 from repair.check.peaks import Peaks
 from repair.curves.base import Curve
-from repair.errors import OutputError, path_of
+from repair.errors import OutputError, kind_of, path_of
 from repair.io.commonroad import to_dynamic_obstacle, to_solution, to_trajectory
 from repair.io.destination import require_folder
 from repair.io.trace.considered import considered
@@ -164,6 +164,8 @@ class RepairResult:
             As there.
         """
         target = path_of(folder, "the folder of a result", OutputError)
+        if not isinstance(figure, bool | FigureStyle):
+            raise OutputError(f"figure is True, False or a FigureStyle, not {kind_of(figure)}")
         require_folder(target)
         outcome, scene = self.outcome, self.prepared.scene
         looked_at = None

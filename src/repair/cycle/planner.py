@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from commonroad.planning.planner_interface import TrajectoryPlannerInterface
@@ -46,8 +47,10 @@ class RepairingPlanner(TrajectoryPlannerInterface):  # type: ignore[misc]  # com
             raise ConfigError(f"a planner with a method plan is expected, not {kind_of(nominal)}")
         if config is not None and keys:
             raise ConfigError("give either a config or configuration keys, not both")
-        self.nominal = nominal
-        self.config = load_config(**keys) if config is None else config
+        config = load_config(**keys) if config is None else config
+        if not isinstance(config, Config):
+            raise ConfigError(f"config has to come from repair.load_config, and is {kind_of(config)}")
+        self.nominal, self.config = nominal, config
         self.result: RepairResult | None = None
 
     def plan(self, sc: Any, pp: Any, ref_path: npt.NDArray[Any] | None = None) -> Any:
@@ -74,6 +77,10 @@ class RepairingPlanner(TrajectoryPlannerInterface):  # type: ignore[misc]  # com
             planned = self.nominal.plan(sc, pp, ref_path)
         if planned is None:  # which would ask for a reference of our own
             raise ReferenceTrajectoryError(f"{type(self.nominal).__name__} has planned nothing")
+        if isinstance(planned, str | Path):  # which would name a reference of our own, or a file
+            raise ReferenceTrajectoryError(
+                f"{type(self.nominal).__name__} has planned {kind_of(planned)}, which is no trajectory"
+            )
         scene = scene_from_scenario(sc, pp, self.config)
         self.result = repair(scene, self.config, reference=planned)
         return self.result.trajectory
