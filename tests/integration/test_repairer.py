@@ -20,6 +20,7 @@ import repair
 from repair.api import find
 from repair.backend.base import SolveResult, SolveStatus
 from repair.cycle.paced import Pace, Paced
+from repair.cycle.scenery import fits
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError, ScenarioError
@@ -195,6 +196,13 @@ def test_a_plan_elsewhere_gets_a_frame_of_its_own(scene):
     assert any(word.startswith("frame") for word in cycle.rebuilt)
     assert not cycle.kept
     assert not watch.update(plan(scene, 0.2, aside=1.0), now=0.2).rebuilt
+
+
+def test_who_sets_out_across_the_path_gets_a_frame_of_its_own():
+    s = 30.0 + np.linspace(0.0, 0.4, 20)
+    for slope, along in ((0.0, True), (0.1, True), (0.35, False), (-0.35, False)):
+        assert fits(np.stack([s, slope * (s - 30.0)], axis=1), 100.0, 20.0) is along
+    assert fits(np.full((20, 2), [30.0, 0.1]), 100.0, 20.0)  # who stands sets out nowhere
 
 
 def test_without_speeds_the_plan_says_them_by_its_places(scene):

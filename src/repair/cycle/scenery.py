@@ -22,6 +22,7 @@ from repair.timegrid import INSTANT, steps_until
 __all__ = ["fits", "in_frame", "scene_now", "scene_of"]
 
 _BESIDE = 0.2  # a plan further beside the kept frame's path gets one of its own [m]; smoothing takes 0.1
+_SETS_OUT, _SLOPE = 0.1, 0.2  # after so much of it [m] it leads across the path by no more than this share
 _LEAST = 3  # steps of a horizon
 _HORIZON = 10.0  # unless ``scene.horizon`` says another [s]
 
@@ -94,12 +95,18 @@ def scene_now(
 
 
 def fits(places: Array, length: float, room: float) -> bool:
-    """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have."""
+    """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have.
+
+    It has to set out along it, too: who crawls would bend within centimetres to get from one to the other.
+    """
+    moved = places - places[0]
+    begun = moved[np.hypot(*moved.T) >= _SETS_OUT]
     return bool(
         np.isfinite(places).all()
         and np.abs(places[:, 1]).max() <= _BESIDE
         and places[0, 0] > 1.0
         and places[-1, 0] <= length - room + INSTANT
+        and (not len(begun) or abs(begun[0, 1]) <= _SLOPE * abs(begun[0, 0]))
     )
 
 
