@@ -132,8 +132,8 @@ def test_larger_margins_may_show_another_way():
     assert shut.status is SearchStatus.NONE_FEASIBLE
     (only,) = other_ways(source.at(0.0), source.widened(0.0))
     assert [p.passing.maneuver for p in only] == [Maneuver.YIELD]
-    assert too_close([(only[0], Verdict((Violation(Reason.MARGIN, 0.0),)))])
-    assert not too_close([(only[0], Verdict((Violation(Reason.OFF_ROAD, 0.0),)))])
+    assert too_close(Verdict((Violation(Reason.MARGIN, 0.0),)))
+    assert not too_close(Verdict((Violation(Reason.OFF_ROAD, 0.0),)))
 
 
 def test_notches_beyond_a_list_are_none():

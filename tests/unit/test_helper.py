@@ -13,6 +13,7 @@ from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import load_config
 from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime
+from repair.errors import RepairError
 from repair.problem.problem import Maneuver
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
@@ -190,6 +191,34 @@ def test_the_registry_makes_the_helper_once_and_when_it_is_asked_for():
     assert backend.capabilities.helpers["shooting"]() is helper
     assert CasadiBackend.capabilities.helpers == {}
     assert make_backend("ego", load_config()).capabilities.helpers == {}
+
+
+def test_who_helps_is_a_key():
+    def helpers(*overrides):
+        config = load_config(backend="casadi", overrides=overrides)
+        return list(make_backend("casadi", config).capabilities.helpers), config
+
+    assert helpers()[0] == ["ego", "shooting"]
+    assert helpers("casadi.helpers=[]")[0] == []
+    names, config = helpers("casadi.helpers=[qptr,qptr]", "qptr.solver=daqp", "fallback=[]")
+    assert names == ["qptr"]
+    assert not list(config.without_effect())
+    # strict problems are shown to nobody
+    (said,) = helpers("casadi.helpers=[ego]", "repair.relax=[]")[1].without_effect()
+    assert said == ("casadi.helpers", "repair.relax", "[]")
+
+
+@pytest.mark.parametrize(
+    "named, says",
+    [
+        ("casadi", "casadi.helpers names 'casadi': it cannot help itself"),
+        ("portfolio", "casadi.helpers names 'portfolio': it is made of several backends"),
+        ("egg", "egg"),
+    ],
+)
+def test_helpers_that_cannot_be(named, says):
+    with pytest.raises(RepairError, match=says):
+        make_backend("casadi", load_config(backend="casadi", overrides=[f"casadi.helpers=[{named}]"]))
 
 
 # ------------------------------------------------------------------ what casadi makes of a verified curve

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -605,27 +606,107 @@ def test_the_last_feasible_curve_is_offered_as_a_warm_start_where_it_is_of_use()
 # -- what a backend is able to do ----------------------------------------------------------------------
 
 
+class Relaxing(FakeSource):
+    """The problems with smaller margins; some manoeuvres open with a smaller one only."""
+
+    def __init__(self, *margins, opens=None, strict=False):
+        super().__init__()
+        self.margins, self.opens, self.strict = margins, opens or {}, strict
+
+    def at(self, t_rep, margin=0.1):
+        return tuple(
+            replace(problem, margin=margin, strict=self.strict)
+            for problem in super().at(t_rep)
+            if margin <= self.opens.get(problem.passing.maneuver, math.inf)
+        )
+
+    def relaxed(self, t_rep):
+        return (self.at(t_rep, margin) for margin in self.margins)
+
+
+class Narrow(FakeBackend):
+    """Has a curve past a side up to some margin; of some sides it says what is missing."""
+
+    def __init__(self, widest, says=(), **keys):
+        super().__init__(**keys)
+        self.widest, self.says = widest, set(says)
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        maneuver = problem.passing.maneuver
+        missing = problem.margin - self.widest[maneuver]
+        if missing <= 1e-9:
+            return super().solve(problem, warm_start=warm_start, time_limit=time_limit)
+        self.limits.append(time_limit)
+        closest = Closest(toy.constant(10.0), missing) if maneuver in self.says else None
+        return SolveResult(SolveStatus.INFEASIBLE, closest=closest)
+
+
 @pytest.mark.parametrize("relaxes", [False, True])
 def test_smaller_margins_are_asked_for_where_the_backend_keeps_its_own(relaxes):
-    margins = (0.05, 0.0)
-
-    class Relaxing(FakeSource):
-        def relaxed(self, t_rep):
-            for margin in margins:
-                yield tuple(replace(problem, margin=margin) for problem in self.at(t_rep))
-
-    checker = FakeChecker(lambda problem: problem.margin < 0.01)
-    backend = FakeBackend(capabilities=Capabilities(relaxes=relaxes))
-    result = search(checker, source=Relaxing(), backend=backend, upper=0.0)
+    backend = Narrow({Maneuver.YIELD: 0.0}, capabilities=Capabilities(relaxes=relaxes))
+    result = search(until(9.0), source=Relaxing(0.05, 0.0), backend=backend, upper=0.0)
     (probe,) = result.probes
     if relaxes:
         assert (result.status, probe.margin) == (SearchStatus.FOUND, 0.0)
         assert probe.tried == (
-            "yield: collision", "yield: collision (margin 0.05 m)", "yield: feasible (margin 0 m)",
+            "yield: not_solved", "yield: not_solved (margin 0.05 m)", "yield: feasible (margin 0 m)",
         )  # fmt: skip
     else:
-        assert (result.status, probe.tried) == (SearchStatus.NONE_FEASIBLE, ("yield: collision",))
+        assert (result.status, probe.tried) == (SearchStatus.NONE_FEASIBLE, ("yield: not_solved",))
         assert len(backend.limits) == 1
+
+
+def test_smaller_margins_are_asked_for_where_they_may_help():
+    # left misses 2.6 m, and says so; right has a curve from the first one on, which comes too close
+    backend = Narrow(
+        {Maneuver.LEFT: -2.5, Maneuver.RIGHT: -0.1, Maneuver.YIELD: -9.0}, says={Maneuver.LEFT},
+        capabilities=Capabilities(relaxes=True),
+    )  # fmt: skip
+    source = Relaxing(-0.1, -0.3, -1.3, -2.5)
+    source.maneuvers = (Maneuver.LEFT, Maneuver.RIGHT, Maneuver.YIELD)
+    checker = FakeChecker(lambda problem: problem.passing.maneuver is Maneuver.LEFT and problem.margin < -2.0)
+    (probe,) = search(checker, source=source, backend=backend, upper=0.0).probes
+    margins = {name: [] for name in ("left", "right", "yield")}
+    for text in probe.tried[3:]:
+        name, _, rest = text.partition(": ")
+        margins[name].append(rest)
+    assert probe.feasible
+    assert margins["left"] == ["feasible (margin -2.5 m)"]
+    assert margins["right"] == ["collision (margin -0.1 m)"]
+    # nobody knows by how much it misses
+    assert margins["yield"] == [f"not_solved (margin {m:g} m)" for m in (-0.1, -0.3, -1.3, -2.5)]
+
+
+def test_a_side_that_opens_with_a_smaller_margin_is_asked():
+    backend = Narrow({Maneuver.YIELD: -9.0, Maneuver.LEFT: -0.3}, capabilities=Capabilities(relaxes=True))
+    source = Relaxing(-0.1, -0.3, opens={Maneuver.LEFT: -0.3})
+    source.maneuvers = (Maneuver.YIELD, Maneuver.LEFT)
+    (probe,) = search(until(9.0), source=source, backend=backend, upper=0.0).probes
+    assert (probe.feasible, probe.maneuver, probe.margin) == (True, Maneuver.LEFT, -0.3)
+
+
+def test_no_proof_is_asked_for_where_little_would_follow():
+    asked = []
+
+    class Proven:
+        def __call__(self, t_rep):
+            asked.append(t_rep)
+            return True
+
+    def tried(helpers, strict=False):
+        backend = Narrow({Maneuver.YIELD: -9.0}, capabilities=Capabilities(relaxes=True, helpers=helpers))
+        source = Relaxing(-0.1, strict=strict)
+        keys = {"hopeless": Proven()}
+        found = search_f_ttr(
+            source, Conflict(0.3, "margin", 7, 0.35), backend, until(9.0), SearchConfig(upper=0.0), **keys
+        )
+        return found.probes[0].tried
+
+    assert tried({"helper": FakeBackend})[-1] == "no further: it is proven to be too late"
+    assert len(asked) == 1
+    assert tried({})[-1] == "yield: not_solved (margin -0.1 m)"
+    assert tried({"helper": FakeBackend}, strict=True)[-1] == "yield: not_solved (margin -0.1 m)"
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("strict", [False, True])

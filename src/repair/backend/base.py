@@ -239,8 +239,9 @@ class BackendSpec:
         Packages without which it cannot be made.
     says : str
         One line for people.
-    helpers : tuple of str
-        Names of the backends that :attr:`Capabilities.helpers` make.
+    helpers : tuple of str, or str
+        Names of the backends that :attr:`Capabilities.helpers` make; or the field of its settings that lists
+        them.
     fallbacks : tuple of str
         Names of the backends that :attr:`Capabilities.fallbacks` makes where nobody says otherwise.
     members : str
@@ -251,6 +252,6 @@ class BackendSpec:
     settings: type | None = None
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
-    helpers: tuple[str, ...] = ()
+    helpers: tuple[str, ...] | str = ()
     fallbacks: tuple[str, ...] = ()
     members: str = ""

@@ -23,7 +23,7 @@ from repair.scene.settings import SceneConfig
 from repair.search.rules import RULES
 from repair.search.settings import ExplainConfig, SearchConfig
 from repair.settings import Key, keys_of, require_type, setting
-from repair.solvers.registry import BACKENDS, backend_names, fallbacks_of, sections
+from repair.solvers.registry import BACKENDS, backend_names, fallbacks_of, helpers_of, sections
 
 __all__ = [
     "Config", "configuration_keys", "key_names", "require_types", "schema", "values_of", "wanted_beside",
@@ -110,6 +110,8 @@ class Config:
                 yield key.name, "backend", self.backend
             if key.name in self.given and owner == "evasive" and not self.metrics and self.driver == "f_ttr":
                 yield key.name, "metrics", "[]"
+            if key.name in self.given and key.name == _helpers_key(owner) and not self.repair.relax:
+                yield key.name, "repair.relax", "[]"
             if key.name in self.given and owner == "simulate":
                 yield key.name, "command", "run"
 
@@ -128,7 +130,8 @@ class Config:
                 continue
             asked.add(name)
             spec = BACKENDS[name]
-            further += [*spec.helpers, *(getattr(self.section(name), spec.members) if spec.members else ())]
+            further += helpers_of(name, self)
+            further += getattr(self.section(name), spec.members) if spec.members else ()
         return asked
 
     def __new__(cls, *args: Any, **keys: Any) -> Config:
@@ -138,6 +141,12 @@ class Config:
     def __reduce__(self) -> tuple[Any, ...]:
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         return _restored, (values, self.given)
+
+
+def _helpers_key(backend: str) -> str:
+    """The key that lists a backend's helpers, who see no strict problem; empty where there is none."""
+    helpers = BACKENDS[backend].helpers if backend in backend_names() else ()
+    return f"{backend}.{helpers}" if isinstance(helpers, str) else ""
 
 
 # A section of that name would stand in its place.

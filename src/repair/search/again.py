@@ -63,8 +63,8 @@ def probe_again(
     ----------
     probe : Probe
         Of the sides as they were; the answer where none of them can be had.
-    rejected : sequence of (RepairProblem, Verdict)
-        The sides, and what the checker said of each.
+    rejected : sequence of (RepairProblem, Probe)
+        The sides, and how each failed.
     source : ProblemSource
         Says by how much.
     ask : callable
@@ -73,7 +73,7 @@ def probe_again(
     """
     tried = list(probe.tried)
     for problem, first in rejected:
-        verdict, taken = first, Notches()
+        verdict, taken = first.verdict, Notches()
         while not verdict.ok:
             further = taken.after(verdict)
             amounts = further.amounts(source.notches)
@@ -90,9 +90,9 @@ def probe_again(
     return replace(probe, tried=tuple(tried))
 
 
-def too_close(rejected: Rejected) -> bool:
-    """Some side came too close to an obstacle."""
-    return any(Notches().after(verdict).room for _, verdict in rejected)
+def too_close(verdict: Verdict) -> bool:
+    """Whether it came too close to an obstacle."""
+    return Notches().after(verdict).room > 0
 
 
 def other_ways(

@@ -28,8 +28,8 @@ __all__ = [
     "words",
 ]
 
-#: The sides that the checker rejected, and what it said of each.
-Rejected = list[tuple[RepairProblem, Verdict]]
+#: The sides that failed, and how.
+Rejected = list[tuple[RepairProblem, Probe]]
 
 
 class ProblemSource(Protocol):
@@ -127,7 +127,7 @@ def probe_sides(
     Returns
     -------
     probe : Probe
-    rejected : list of (RepairProblem, Verdict)
+    rejected : list of (RepairProblem, Probe)
         The sides that failed.
     """
     best: Probe | None = None
@@ -140,7 +140,7 @@ def probe_sides(
         probe = probe_one(t_rep, problem, backend, checker, warm_start, budget)
         tried.append(words(probe))
         if not probe.feasible:
-            rejected.append((problem, probe.verdict))
+            rejected.append((problem, probe))
         if best is None or better(probe, best):
             best = probe
         if sides == "first" and probe.feasible:

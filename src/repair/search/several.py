@@ -244,7 +244,7 @@ def _slow(can: Capabilities, refused: Collection[str], times: float = math.inf) 
     """
     if can.own_way:
         return times > _FEW
-    return (can.relaxes and not can.helpers) or not can.helpers.keys() <= set(refused)
+    return not can.helpers.keys() <= set(refused)
 
 
 def _left(settings: SearchConfig, begin: float) -> float | None:

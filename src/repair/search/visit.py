@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from repair.backend.base import RepairBackend
@@ -11,7 +10,16 @@ from repair.curves.base import Curve
 from repair.deadline import OutOfTime
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import other_ways, probe_again, too_close
-from repair.search.probe import Budget, ProblemSource, TrajectoryChecker, probe_one, probe_sides, words
+from repair.search.margins import probe_smaller, with_margin
+from repair.search.probe import (
+    Budget,
+    ProblemSource,
+    Rejected,
+    TrajectoryChecker,
+    probe_one,
+    probe_sides,
+    words,
+)
 from repair.search.result import Probe
 
 __all__ = ["visit"]
@@ -38,7 +46,8 @@ def visit(
     probe, rejected = probe_sides(t_rep, first, backend, checker, at_first or sides, warm_start, budget)
     if probe.feasible:
         return probe
-    if (backend.capabilities.relaxes or backend.capabilities.helpers) and _hopeless(t_rep, budget):
+    helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
+    if helpers and _hopeless(t_rep, budget):
         return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
     tightens = any(source.notches)
     if tightens:
@@ -46,30 +55,32 @@ def visit(
             probe, rejected, source,
             lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), budget,
         )  # fmt: skip
+
+    def ask(problems: Sequence[RepairProblem]) -> tuple[Probe, Rejected]:
+        return probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
+
     nobody = False
     try:
         if not probe.feasible and not budget.spent:  # cheaper than all margins, and mostly it is what helps
-            probe, nobody = _helped(probe, first, source, backend, checker, sides, budget)
+            probe, nobody = _helped(helpers, probe, first, source, backend, checker, sides, budget)
     except OutOfTime:
         budget.cut = True
     # Boxes in (s, l) are not the vehicles in them. In a bend they are too narrow, and past larger ones
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
-    others: list[Iterable[Sequence[RepairProblem]]] = []
-    if tightens and too_close(rejected) and _any_shut(first):
-        others.append(other_ways(first, source.widened(t_rep)))
-    if backend.capabilities.relaxes and not nobody:
-        others.append(source.relaxed(t_rep))
     try:
-        for problems in itertools.chain.from_iterable(others):
-            if probe.feasible:
-                break
-            if budget.spent:
-                budget.cut = True
-                break
-            again, _ = probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
-            tried = (*probe.tried, *(f"{text} (margin {problems[0].margin:g} m)" for text in again.tried))
-            probe = replace(again if again.feasible else probe, tried=tried)
+        near = any(too_close(failed.verdict) for _, failed in rejected)
+        if not probe.feasible and tightens and near and _any_shut(first):
+            for problems in other_ways(first, source.widened(t_rep)):
+                if budget.spent:
+                    budget.cut = True
+                    break
+                again, _ = ask(problems)
+                probe = with_margin(probe, again, problems[0].margin)
+                if probe.feasible:
+                    break
+        if not probe.feasible and backend.capabilities.relaxes and not nobody:
+            probe = probe_smaller(probe, rejected, source.relaxed(t_rep), ask, budget)
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
@@ -92,6 +103,7 @@ def _hopeless(t_rep: float, budget: Budget) -> bool:
 
 
 def _helped(
+    helpers: Mapping[str, Callable[[], RepairBackend]],
     probe: Probe,
     first: Sequence[RepairProblem],
     source: ProblemSource,
@@ -113,7 +125,6 @@ def _helped(
         something that the checker refuses.
     """
     nobody = False
-    helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
     for make in helpers.values():
         if probe.feasible or budget.spent:
             break
@@ -151,7 +162,7 @@ def _helped_by(
     again = probe_one(t_rep, along, backend, checker, curve, budget)
     if not again.feasible and any(source.notches):
         again = probe_again(
-            again, [(along, again.verdict)], source,
+            again, [(along, again)], source,
             lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), budget,
         )  # fmt: skip
     said = f"from a curve of {helper.name} that passes every check"

@@ -25,8 +25,8 @@ from repair.solvers.portfolio.settings import PortfolioConfig
 from repair.solvers.shooting.settings import ShootingConfig
 
 __all__ = [
-    "BACKENDS", "available", "backend_names", "describe", "fallbacks_of", "make_backend", "register",
-    "sections",
+    "BACKENDS", "available", "backend_names", "describe", "fallbacks_of", "helpers_of", "make_backend",
+    "register", "sections",
 ]  # fmt: skip
 
 _IMPORT = 0.05  # [s] what importing a backend may take, the packages that it needs being there
@@ -67,7 +67,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             CasadiConfig,
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
-            helpers=("ego", "shooting"),
+            helpers="helpers",
             fallbacks=("ego", "qptr", "shooting"),
         ),
         "qptr": BackendSpec(
@@ -180,8 +180,8 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
         raise BackendError(
             f"backend {name!r} declares no capabilities; it needs an attribute capabilities = Capabilities()"
         )
-    if spec.helpers:
-        helpers = {each: _helper(each, config) for each in spec.helpers}
+    if named := helpers_of(name, config):
+        helpers = {each: _helper(each, config) for each in named}
         made.capabilities = replace(made.capabilities, helpers=helpers)
     if spec.members:
         names = getattr(config.section(name), spec.members)
@@ -189,6 +189,25 @@ def make_backend(name: str, config: Configuration) -> RepairBackend:
     if others := fallbacks_of(name, config):
         made.capabilities = replace(made.capabilities, fallbacks=_members(others, config))
     return made
+
+
+def helpers_of(name: str, config: Configuration) -> list[str]:
+    """Names of the backends that are asked for a curve where this one finds nothing at a t_rep.
+
+    Raises
+    ------
+    BackendError
+        If it is one of them itself, or one of them is made of several.
+    """
+    spec = BACKENDS[name]
+    if not isinstance(spec.helpers, str):
+        return list(spec.helpers)
+    named = list(dict.fromkeys(getattr(config.section(name), spec.helpers)))
+    for each in named:
+        if each == name or BACKENDS[each].members:
+            why = "it cannot help itself" if each == name else "it is made of several backends"
+            raise BackendError(f"{name}.{spec.helpers} names {each!r}: {why}")
+    return named
 
 
 def fallbacks_of(name: str, config: Configuration) -> list[str]:

@@ -14,6 +14,12 @@ class CasadiConfig:
     """The hard-constraint NLP."""
 
     solver: str = setting("ipopt", "CasADi's solver of the NLP", choices=("ipopt", "sqpmethod"))
+    helpers: list[str] = setting(
+        factory=lambda: ["ego", "shooting"],
+        says="backends that are asked for a curve to start from where it finds nothing; [] is faster, and "
+        "some F-TTR are earlier",
+        registry="backend",
+    )
     obstacles: str = setting(
         "hull",
         "obstacle rows at all times by the convex hull, or at samples only",
