@@ -35,7 +35,8 @@ PLAIN = ("fallback=[]",)
 BACKENDS: dict[str, tuple[str, ...]] = {
     "ego": PLAIN,
     "casadi": (*PLAIN, "casadi.solver=sqpmethod"),
-    "casadi alone": (*PLAIN, "casadi.solver=sqpmethod", "repair.relax=[]"),
+    "casadi alone": (*PLAIN, "casadi.solver=sqpmethod", "casadi.helpers=[]"),
+    "casadi strict": (*PLAIN, "casadi.solver=sqpmethod", "repair.relax=[]"),
     "qptr": PLAIN,
 }
 
@@ -121,8 +122,8 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
     ways = {"this version": ROOT / "src", **({} if before is None else {"before": before})}
     others = {}
     for name, sources in ways.items():
-        # an earlier version has no such key, and no other backend that it would ask
-        keys = [k for k in overrides if name != "before" or not k.startswith("fallback")]
+        # an earlier version has no such keys, and no other backend that it would ask
+        keys = [k for k in overrides if name != "before" or not k.startswith(("fallback", "casadi.helpers"))]
         others[name] = Rebuilding(sources, file, backend, keys)
     spent: list[float] = []
     parts: dict[str, list[float]] = defaultdict(list)
