@@ -657,12 +657,12 @@ def test_smaller_margins_are_asked_for_where_the_backend_keeps_its_own(relaxes):
 
 
 def test_smaller_margins_are_asked_for_where_they_may_help():
-    # left misses 2.6 m, and says so; right has a curve from the first one on, which comes too close
+    # left misses 4.1 m, and says so; right has a curve from the first one on, which comes too close
     backend = Narrow(
-        {Maneuver.LEFT: -2.5, Maneuver.RIGHT: -0.1, Maneuver.YIELD: -9.0}, says={Maneuver.LEFT},
+        {Maneuver.LEFT: -4.0, Maneuver.RIGHT: -0.1, Maneuver.YIELD: -9.0}, says={Maneuver.LEFT},
         capabilities=Capabilities(relaxes=True),
     )  # fmt: skip
-    source = Relaxing(-0.1, -0.3, -1.3, -2.5)
+    source = Relaxing(-0.1, -0.3, -1.3, -4.0)
     source.maneuvers = (Maneuver.LEFT, Maneuver.RIGHT, Maneuver.YIELD)
     checker = FakeChecker(lambda problem: problem.passing.maneuver is Maneuver.LEFT and problem.margin < -2.0)
     (probe,) = search(checker, source=source, backend=backend, upper=0.0).probes
@@ -671,10 +671,10 @@ def test_smaller_margins_are_asked_for_where_they_may_help():
         name, _, rest = text.partition(": ")
         margins[name].append(rest)
     assert probe.feasible
-    assert margins["left"] == ["feasible (margin -2.5 m)"]
+    assert margins["left"] == ["feasible (margin -4 m)"]
     assert margins["right"] == ["collision (margin -0.1 m)"]
     # nobody knows by how much it misses
-    assert margins["yield"] == [f"not_solved (margin {m:g} m)" for m in (-0.1, -0.3, -1.3, -2.5)]
+    assert margins["yield"] == [f"not_solved (margin {m:g} m)" for m in (-0.1, -0.3, -1.3, -4.0)]
 
 
 def test_a_side_that_opens_with_a_smaller_margin_is_asked():
