@@ -169,6 +169,7 @@ def find(
     on_probe: Callable[[Probe], None] | None = None,
     settings: SearchConfig | None = None,
     visits: Sequence[float] | None = None,
+    like: Probe | None = None,
 ) -> SearchResult:
     """The search alone, as the configuration (or other ``settings`` of the search) describes it.
 
@@ -178,6 +179,8 @@ def find(
         Where the TTR is kept that ``driver: at_ttr`` needs.
     visits : sequence of float, optional
         The times-to-repair to try [s], instead of those of the search's rule.
+    like : Probe, optional
+        What passed in a search that is much like this one; see :func:`repair.search.search.search_f_ttr`.
 
     Raises
     ------
@@ -193,6 +196,7 @@ def find(
         return search_with(
             backend, name, prepared, settings,
             visits=visits, too_late=prepared.too_late, hopeless=prepared.hopeless, on_probe=on_probe,
+            like=like,
         )  # fmt: skip
     begin = time.perf_counter()
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
 from repair.preparation import Prepared
 from repair.scene.frame import FrenetFrame
+from repair.search.result import Probe, SearchResult
 from repair.timegrid import INSTANT, on_grid
 
 __all__ = ["KeptRepair", "Later", "verified_again"]
@@ -66,12 +68,18 @@ class KeptRepair:
     now : float
         [s].
     frame : FrenetFrame
+    probe : Probe or None
+        What came of the search at ``f_ttr``.
+    failed : float
+        From when on nothing was found [s], after ``now``.
     """
 
     curve: Curve
     f_ttr: float
     now: float
     frame: FrenetFrame
+    probe: Probe | None = None
+    failed: float = math.inf
 
     def seen_from(self, now: float) -> Curve:
         """The curve with its times counted from a later cycle."""
@@ -83,6 +91,21 @@ class KeptRepair:
     def due(self, now: float) -> float:
         """What is left of its time-to-repair [s]; negative once it is past."""
         return self.f_ttr - (now - self.now)
+
+    def guess(self, now: float, step: float) -> float:
+        """In the middle between what was feasible and what was not, of a grid of so many seconds [s]."""
+        return 0.5 * (self.due(now) + self.late(now, step))
+
+    def late(self, now: float, step: float) -> float:
+        """When nothing was feasible any more, of a grid of so many seconds [s]."""
+        return min(self.failed, self.f_ttr + step) - (now - self.now)
+
+    def beside(self, found: SearchResult, now: float, last: KeptRepair | None = None) -> KeptRepair:
+        """The same with what a search, and the repair that was kept before, know of later t_rep."""
+        failed = [p.t_rep + now for p in found.probes if found.complete and not p.feasible]
+        failed += [one.failed + one.now for one in (self, last) if one is not None]
+        own = self.f_ttr + self.now
+        return replace(self, failed=min(at for at in (*failed, math.inf) if at > own) - self.now)
 
 
 def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[float, Curve] | None:

@@ -264,10 +264,14 @@ class Repairer:
                         prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
                     with phases("problem"):
                         self._source(prepared)
-                guess = last.due(asked.now) if last is not None and refuted else None
+                guess, like, step = None, None, self.config.search.delta_t
+                if last is not None and refuted and last.due(asked.now) >= 0.0:
+                    guess = last.guess(asked.now, step)
+                if last is not None and last.probe is not None:
+                    like = last.probe, last.late(asked.now, step)
                 found = searched(
-                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
-                    guess if guess is not None and guess >= 0.0 else None, thorough=True,
+                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0], guess,
+                    thorough=True, like=like,
                 )  # fmt: skip
                 if found.probes:
                     longest = max(probe.check_time for probe in found.probes)
@@ -335,8 +339,12 @@ class Repairer:
         curve: Curve = prepared.reference
         if part is not None and f_ttr is not None:
             curve = SplicedCurve(prepared.reference, part, f_ttr)
-            if not is_kept:
-                self._kept = KeptRepair(part, f_ttr, asked.now, prepared.scene.frame)
+            last = self._kept
+            if not is_kept or last is None:
+                new = KeptRepair(part, f_ttr, asked.now, prepared.scene.frame, found.best)
+                self._kept = new.beside(found, asked.now, last)
+            else:
+                self._kept = last.beside(found, asked.now)
         elif refuted and found.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
         return Cycle(

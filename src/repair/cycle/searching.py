@@ -30,6 +30,7 @@ def searched(
     above: float | None = None,
     stride: float | None = None,
     on_probe: Callable[[Probe], None] | None = None,
+    like: tuple[Probe, float] | None = None,
 ) -> SearchResult:
     """The F-TTR of a cycle.
 
@@ -52,9 +53,11 @@ def searched(
         How much farther such a rule looks after ``guess`` [s], by default by one step of the grid.
     on_probe : callable, optional
         Called after every probe; one that raises :class:`repair.deadline.OutOfTime` ends the search.
+    like : (Probe, float), optional
+        What passed a cycle ago, and before when [s] its side is asked first, as tight as it had to be.
     """
     begin = time.perf_counter()
-    found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe)
+    found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe, like)
     nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
     if thorough and nothing and settings.rule in CONTIGUOUS:
         return _the_rest(prepared, backend, settings, begin, found)
@@ -70,6 +73,7 @@ def _searched(
     above: float | None,
     stride: float | None,
     on_probe: Callable[[Probe], None] | None,
+    like: tuple[Probe, float] | None,
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
     end = _end(prepared, settings)
@@ -89,7 +93,8 @@ def _searched(
     complete, k = True, next(order, None)
     while k is not None and complete:
         left = _left(settings, begin)
-        found = find(prepared, backend, settings=left, visits=(k * step,), on_probe=on_probe)
+        alike = like[0] if like is not None and k * step < like[1] - INSTANT else None
+        found = find(prepared, backend, settings=left, visits=(k * step,), on_probe=on_probe, like=alike)
         probes += found.probes
         complete = found.complete
         try:

@@ -48,7 +48,7 @@ def probe_again(
     probe: Probe,
     rejected: Rejected,
     source: ProblemSource,
-    ask: Callable[[RepairProblem], Probe],
+    ask: Callable[[RepairProblem, tuple[float, ...]], Probe],
     budget: Budget,
 ) -> Probe:
     """Tighten side after side by what the checker missed, again and again, until one passes.
@@ -68,7 +68,7 @@ def probe_again(
     source : ProblemSource
         Says by how much.
     ask : callable
-        Solves and checks a problem.
+        Solves and checks a problem that is tightened by so much.
     budget : Budget
     """
     tried = list(probe.tried)
@@ -82,11 +82,11 @@ def probe_again(
             if budget.spent:
                 budget.cut = True
                 return replace(probe, tried=tuple(tried))
-            again = ask(problem.tightened(*amounts))
-            tried.append(f"{words(again)} ({_said(*amounts)})")
+            again = ask(problem, amounts)
+            tried.append(words(again, amounts))
             verdict, taken = again.verdict, further
             if again.feasible:
-                return replace(again, tried=tuple(tried))
+                return replace(again, tried=tuple(tried), tightened=amounts)
     return replace(probe, tried=tuple(tried))
 
 
@@ -105,12 +105,3 @@ def other_ways(
         known |= {problem.passing and problem.passing.maneuver for problem in fresh}
         if fresh:
             yield fresh
-
-
-def _said(room: float, edge: float, unused: float) -> str:
-    parts = (
-        f"margin +{room:g} m" if room else "",
-        f"road {edge:g} m narrower" if edge else "",
-        f"{100.0 * unused:g} % of the limits unused" if unused else "",
-    )
-    return ", ".join(part for part in parts if part)

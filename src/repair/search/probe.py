@@ -96,6 +96,8 @@ class Budget:
     cut: bool = False  # the last probe would have gone on, had there been time
     # the sides of feasible t_rep that nobody was asked for yet, as another one had passed
     unasked: dict[float, Sequence[RepairProblem]] = field(default_factory=dict)
+    # what passed in an earlier search that is much like this one: its side is asked first, as tight
+    like: Probe | None = None
 
     @property
     def left(self) -> float | None:
@@ -181,10 +183,20 @@ def probe_one(
     return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
 
 
-def words(probe: Probe) -> str:
-    """The side that was tried, and what came of it."""
+def words(probe: Probe, tightened: Sequence[float] = ()) -> str:
+    """The side that was tried, by what it was tightened (room, road, limits), and what came of it."""
     name = probe.maneuver.value if probe.maneuver is not None else "follow"
-    return f"{name}: {'feasible' if probe.verdict.ok else ', '.join(probe.verdict.reasons)}"
+    said = f"{name}: {'feasible' if probe.verdict.ok else ', '.join(probe.verdict.reasons)}"
+    return f"{said} ({_amounts(*tightened)})" if any(tightened) else said
+
+
+def _amounts(room: float, edge: float, unused: float) -> str:
+    parts = (
+        f"margin +{room:g} m" if room else "",
+        f"road {edge:g} m narrower" if edge else "",
+        f"{100.0 * unused:g} % of the limits unused" if unused else "",
+    )
+    return ", ".join(part for part in parts if part)
 
 
 def _judged(

@@ -41,6 +41,8 @@ class Probe:
         [m/s²].
     fallback : bool
         Whether ``by`` was asked because the search had ended without a repair.
+    tightened : (3,) tuple of float
+        By what the problem was tightened: room [m], road [m], limits (share).
     """
 
     t_rep: float
@@ -53,6 +55,7 @@ class Probe:
     by: str = ""
     jump: float = 0.0
     fallback: bool = False
+    tightened: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @property
     def feasible(self) -> bool:

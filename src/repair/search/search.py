@@ -91,8 +91,9 @@ def iter_probes(
         with budget.watched():
             first = made.pop(t_rep) if t_rep in made else source.at(t_rep)
             probe = visit(
-                t_rep, first, source, backend, checker, settings.sides, warm_start, budget, at_first=sides
-            )
+                t_rep, first, source, backend, checker, settings.sides, warm_start, budget, at_first=sides,
+                like=budget.like,
+            )  # fmt: skip
         if probe.feasible and sides != settings.sides:
             budget.unasked[t_rep] = first[len(probe.tried) :]
         if probe.feasible and backend.capabilities.uses_warm_start:
@@ -161,6 +162,7 @@ def search_f_ttr(
     on_probe: Callable[[Probe], None] | None = None,
     after: Probe | None = None,
     hopeless: Hopeless | None = None,
+    like: Probe | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
     """Algorithm 1 of the paper.
@@ -183,6 +185,9 @@ def search_f_ttr(
         A feasible one: only later t_rep are visited, and its curve is where to start from.
     hopeless : Hopeless, optional
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
+    like : Probe, optional
+        What passed in a search that is much like this one: where it had to be tightened, its side is asked
+        first, as tight.
     clock : callable
         Monotonic time [s]; a parameter so that tests can bend it.
 
@@ -202,7 +207,7 @@ def search_f_ttr(
         end = min(end, max(settings.upper, settings.delta_t * 1e-3))
     probes: list[Probe] = []
     complete = True
-    budget = Budget(settings.time_limit, begin, clock, hopeless if settings.proofs else None)
+    budget = Budget(settings.time_limit, begin, clock, hopeless if settings.proofs else None, like=like)
     try:
         for probe in iter_probes(source, backend, checker, end, settings, budget, visits, after):
             probes.append(probe)

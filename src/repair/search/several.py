@@ -40,6 +40,7 @@ def search_with(
     too_late: Callable[[], float] | None = None,
     hopeless: Hopeless | None = None,
     on_probe: Callable[[Probe], None] | None = None,
+    like: Probe | None = None,
 ) -> SearchResult:
     """Algorithm 1 with a backend, or with each member of one that is made of several.
 
@@ -65,13 +66,17 @@ def search_with(
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     on_probe : callable, optional
         Called after every probe.
+    like : Probe, optional
+        What passed in a search that is much like this one; see :func:`repair.search.search.search_f_ttr`.
 
     Raises
     ------
     BackendError
         If a backend raises, or what it answers is no answer.
     """
-    found = _search_with(backend, name, situation, settings, around, visits, too_late, hopeless, on_probe)
+    found = _search_with(
+        backend, name, situation, settings, around, visits, too_late, hopeless, on_probe, like
+    )
     fallbacks = backend.capabilities.fallbacks
     if fallbacks is None or visits is not None or found.status is not SearchStatus.NONE_FEASIBLE:
         return found
@@ -171,6 +176,7 @@ def _search_with(
     too_late: Callable[[], float] | None,
     hopeless: Hopeless | None,
     on_probe: Callable[[Probe], None] | None,
+    like: Probe | None,
 ) -> SearchResult:
     """As :func:`search_with`, without fallbacks."""
 
@@ -181,6 +187,7 @@ def _search_with(
             around or own, situation.conflict, _Unaided(one, name, refused, onward=after), situation.judge,
             settings, visits=visits, on_probe=on_probe if several is None else by(name), after=best,
             hopeless=hopeless if not after or _slow(one.capabilities, refused) else None,
+            like=like if like is not None and like.by in ("", name) else None,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:

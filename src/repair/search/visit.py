@@ -37,12 +37,23 @@ def visit(
     warm_start: Curve | None,
     budget: Budget,
     at_first: str = "",
+    like: Probe | None = None,
 ) -> Probe:
     """One t_rep, with its first problems and then with other margins.
 
-    ``at_first`` is what counts instead of ``sides`` for the first problems.
+    ``at_first`` is what counts instead of ``sides`` for the first problems. Where ``like`` had to be tightened
+    to pass, its side is asked before them, as tight.
     """
     budget.cut = False
+
+    def one(problem: RepairProblem, amounts: tuple[float, ...]) -> Probe:
+        return probe_one(t_rep, problem.tightened(*amounts), backend, checker, warm_start, budget)
+
+    side = _side_of(like, first)
+    tight = () if like is None or side is None else like.tightened
+    known = one(side, tight) if side is not None else None
+    if known is not None and known.feasible:
+        return replace(known, tried=(words(known, tight),), tightened=tight)
     probe, rejected = probe_sides(t_rep, first, backend, checker, at_first or sides, warm_start, budget)
     if probe.feasible:
         return probe
@@ -53,7 +64,8 @@ def visit(
     if tightens:
         probe = probe_again(
             probe, rejected, source,
-            lambda problem: probe_one(t_rep, problem, backend, checker, warm_start, budget), budget,
+            lambda problem, by: known if known and problem is side and by == tight else one(problem, by),
+            budget,
         )  # fmt: skip
 
     def ask(problems: Sequence[RepairProblem]) -> tuple[Probe, Rejected]:
@@ -84,6 +96,13 @@ def visit(
     except OutOfTime:  # while the next problems were made
         budget.cut = True
     return probe
+
+
+def _side_of(like: Probe | None, first: Sequence[RepairProblem]) -> RepairProblem | None:
+    """The side that passed before as tightened; None where none did, or as it was."""
+    if like is None or not any(like.tightened):
+        return None
+    return next((p for p in first if p.passing is None or p.passing.maneuver is like.maneuver), None)
 
 
 def _any_shut(first: Sequence[RepairProblem]) -> bool:
@@ -163,7 +182,9 @@ def _helped_by(
     if not again.feasible and any(source.notches):
         again = probe_again(
             again, [(along, again)], source,
-            lambda problem: probe_one(t_rep, problem, backend, checker, curve, budget), budget,
+            lambda problem, amounts: probe_one(
+                t_rep, problem.tightened(*amounts), backend, checker, curve, budget
+            ), budget,
         )  # fmt: skip
     said = f"from a curve of {helper.name} that passes every check"
     tried = (*probe.tried, f"{words(again)} ({said})")
