@@ -107,8 +107,9 @@ def test_from_a_place_near_by_it_is_the_same_projection(seed: int) -> None:
     outlines = middle[:, None] + rng.uniform(-3.0, 3.0, (40, 5, 2))
     points, start = outlines.reshape(-1, 2), frame.to_frenet(middle)[:, 0].repeat(5)
     np.testing.assert_allclose(to_frenet_from(frame, points, start), frame.to_frenet(points), atol=1e-9)
-    found = to_frenet_around(frame, points, middle, np.full(len(middle), 5))
-    np.testing.assert_allclose(found, frame.to_frenet(points), atol=1e-9)
+    for at in (frame.nearest(middle), np.full(len(middle), -1)):
+        found = to_frenet_around(frame, points, middle, np.full(len(middle), 5), at)
+        np.testing.assert_allclose(found, frame.to_frenet(points), atol=1e-9)
     # and from anywhere: where that is too far, it is searched for
     start = rng.uniform(0.0, frame.length, len(points))
     np.testing.assert_allclose(to_frenet_from(frame, points, start), frame.to_frenet(points), atol=1e-9)

@@ -41,8 +41,8 @@ def visit(
 ) -> Probe:
     """One t_rep, with its first problems and then with other margins.
 
-    ``at_first`` is what counts instead of ``sides`` for the first problems. Where ``like`` had to be tightened
-    to pass, its side is asked before them, as tight.
+    ``at_first`` is what counts instead of ``sides`` for the first problems. Where ``like`` had to be
+    tightened to pass, its side is asked before them, as tight.
     """
     budget.cut = False
 

@@ -9,6 +9,7 @@ the ego may be treated as a point.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,7 +33,9 @@ _Box = tuple[Array, Array, npt.NDArray[np.bool_]]
 
 _STANDING = ("static", "environment")
 _NO_BOX: _Box = np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.bool_)
-_STRIDE = 2.0  # of the places of a path that obstacles are held against [m]
+_BEYOND = 1e12  # as far as this every place is [m]: the search tree has no answer where a square overflows
+_GENTLE = 0.5  # curvature times offset, up to which the nearest place says who is behind and who ahead
+_AROUND = 20.0  # so far around it the curvature is looked at [m]
 
 
 class Within(NamedTuple):
@@ -88,9 +91,12 @@ def build_occupancy(
         Which obstacles leave the frame's domain of projection, and when.
     """
     steps = len(obstacles[0].vertices) if obstacles else 1
-    reach = 0.0 if within is None else within.aside + s_offset + l_offset
-    near = None if within is None else _near_by(obstacles, frame, within, reach)
-    looked = [_looked_at(k, one, None if near is None else near[k]) for k, one in enumerate(obstacles)]
+    if within is None:
+        looked = [_looked_at(k, one) for k, one in enumerate(obstacles)]
+    else:
+        reach = within.aside + s_offset + l_offset
+        near, at = _near_by(obstacles, frame, within, reach)
+        looked = [_looked_at(k, one, near[k], at[k]) for k, one in enumerate(obstacles)]
     looked = [one for one in looked if len(one.steps)]
     lower, upper = np.full((2, len(obstacles), steps, 2), np.nan)
     more: list[tuple[Array, Array]] = []
@@ -125,54 +131,82 @@ def build_occupancy(
 
 
 class _Looked(NamedTuple):
-    """An obstacle, the steps at which it is there and matters, and its outline at these (T, V, 2)."""
+    """An obstacle, the steps at which it is there and matters, and its outline at these (T, V, 2).
+
+    ``at`` (T,) is which of the frame's places is nearest to its middle; negative where nobody has looked.
+    """
 
     row: int
     steps: npt.NDArray[np.intp]
     outline: Array
+    at: npt.NDArray[np.intp]
 
 
-def _looked_at(row: int, obstacle: Obstacle, near: npt.NDArray[np.bool_] | None) -> _Looked:
+def _looked_at(
+    row: int,
+    obstacle: Obstacle,
+    near: npt.NDArray[np.bool_] | None = None,
+    at: npt.NDArray[np.intp] | None = None,
+) -> _Looked:
     steps = np.arange(len(obstacle.vertices)) if near is None else np.flatnonzero(near)
     outline = obstacle.vertices[steps]
     there = np.isfinite(outline).all(axis=(1, 2))
-    return _Looked(row, steps, outline) if there.all() else _Looked(row, steps[there], outline[there])
+    if not there.all():
+        steps, outline = steps[there], outline[there]
+    return _Looked(row, steps, outline, np.full(len(steps), -1) if at is None else at[steps])
 
 
 def _near_by(
     obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, reach: float
-) -> list[npt.NDArray[np.bool_]]:
+) -> tuple[list[npt.NDArray[np.bool_]], list[npt.NDArray[np.intp]]]:
     """At which steps each obstacle may be near the ego; other shapes than rectangles always are.
 
-    A step too early and one too late, since boxes are interpolated between the steps.
+    A step too early and one too late, since boxes are interpolated between the steps. And where it is
+    nearest to the frame, as ``_Looked.at`` says.
     """
     steps = len(obstacles[0].vertices) if obstacles else 0
     found = [np.full(steps, obstacle.rectangles is None) for obstacle in obstacles]
+    at = list(np.full((len(obstacles), steps), -1))
     rows = [k for k, one in enumerate(obstacles) if one.rectangles is not None]
     if not rows:
-        return found
+        return found, at
     tables = np.array([obstacles[k].rectangles for k in rows])  # (N, T, 5)
     centre = tables[..., 0] + 1j * tables[..., 1]
     moved = np.nan_to_num(np.abs(np.diff(centre, axis=1))).max(axis=1, initial=0.0)
-    away = reach + np.hypot(tables[..., 3], tables[..., 4]) + moved[:, None]
-    first, last = (np.clip(s, 0.0, frame.length) for s in (within.low, within.high))
-    at = np.linspace(first, last, max(int((last - first) / _STRIDE) + 1, 2))
-    path = np.ascontiguousarray(frame.position(at)).view(np.complex128)[:, 0]
-    away += at[1] - at[0] + max(first - within.low, 0.0) + max(within.high - last, 0.0)
-    # How far the ego may be settles most, and so does the circle that this makes.
+    size = np.hypot(tables[..., 3], tables[..., 4]) + moved[:, None]
+    # How far the ego may be settles most; then, how far aside of the frame it is, and where along it.
     ways = np.full(steps, -np.inf)
     ways[: len(within.ways)] = within.ways[:steps]
-    i, j = np.nonzero(np.abs(centre - complex(*frame.position(within.start))) <= ways + away)
-    apart = centre[i, j][:, None] - path
-    square = apart.real**2
-    square += apart.imag**2
-    close = square.min(axis=1) <= away[i, j] ** 2
+    i, j = np.nonzero(np.abs(centre - complex(*frame.position(within.start))) <= ways + (reach + size))
+    middle = np.clip(centre[i, j].view(np.float64).reshape(-1, 2), -_BEYOND, _BEYOND)
+    place = frame.nearest(middle)
+    s, half = frame.s[place], size[i, j] + frame.s[1]
+    apart = np.hypot(*(middle - frame.points[place]).T)
+    close = (apart <= reach + half) | (place == 0) | (place == len(frame.s) - 1)  # or beyond an end
+    if len(passes(frame)) == 1:
+        # Along the frame an outline is longer than it is, the more so inside of a bend.
+        long = half / (1.0 - _GENTLE)
+        told = (long <= _AROUND) & (_bends_around(frame)[place] * (apart + half) <= _GENTLE)
+        close &= ~told | (s + long >= within.low) & (s - long <= within.start + ways[j])
     near = np.zeros((len(rows), steps + 2), dtype=np.bool_)
     for shift in (0, 1, 2):
         near[i[close], j[close] + shift] = True
-    for k, one in zip(rows, near[:, 1:-1], strict=True):
-        found[k] = np.full(steps, one.any()) if obstacles[k].role in _STANDING else one
-    return found
+    nearest = np.full((len(rows), steps), -1)
+    nearest[i, j] = place
+    for k, one, its in zip(rows, near[:, 1:-1], nearest, strict=True):
+        found[k], at[k] = one, its
+        if obstacles[k].role in _STANDING:
+            found[k], at[k] = np.full(steps, one.any()), np.full(steps, its.max(initial=-1))
+    return found, at
+
+
+@lru_cache(maxsize=8)
+def _bends_around(frame: FrenetFrame) -> Array:
+    """The sharpest bend (M,) around each of the frame's places [1/m]."""
+    from scipy.ndimage import maximum_filter1d
+
+    cells = 2 * int(np.ceil(_AROUND / frame.s[1])) + 1
+    return frozen(maximum_filter1d(np.abs(frame.curvature_table), cells))
 
 
 def _box(points: Array, inflate: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
@@ -210,7 +244,8 @@ def _boxes(
     if often and len(passes(frame)) == 1:
         middles = np.concatenate([some.mean(axis=1) for some in outlines])
         points = np.repeat([some.shape[1] for some in outlines], [len(some) for some in outlines])
-        projected = [to_frenet_around(frame, stacked, middles, points)]
+        at = np.concatenate([looked[j].at for rows in alike.values() for j in rows])
+        projected = [to_frenet_around(frame, stacked, middles, points, at)]
     else:
         projected = every_pass(frame, stacked)
     for found in projected:

@@ -23,7 +23,11 @@ _BLOCK = 2048  # points that are looked at together: they stay in the processor'
 
 
 def to_frenet_around(
-    frame: FrenetFrame, points: Array, middles: Array, counts: npt.NDArray[np.intp]
+    frame: FrenetFrame,
+    points: Array,
+    middles: Array,
+    counts: npt.NDArray[np.intp],
+    at: npt.NDArray[np.intp],
 ) -> Array:
     """The same as ``frame.to_frenet(points)`` up to rounding, of outlines of a few metres.
 
@@ -39,11 +43,14 @@ def to_frenet_around(
         Somewhere inside of each [m].
     counts : (K,) int array
         How many points each has.
+    at : (K,) int array
+        Which of the frame's places is nearest to each; negative where that is not known.
     """
     known = (np.abs(middles) < _FAR).all(axis=1)
-    index = np.zeros(len(middles), dtype=np.intp)
-    if known.any():
-        index[known] = frame.nearest(middles[known])
+    index = np.where(known, at, 0)
+    unknown = index < 0
+    if unknown.any():
+        index[unknown] = frame.nearest(middles[unknown])
     heading = frame.heading_table[index]
     rows = np.stack([
         np.where(known, frame.s[index], np.nan), *frame.points[index].T, np.cos(heading), np.sin(heading),
