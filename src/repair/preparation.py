@@ -23,8 +23,8 @@ from repair.config.agreed import agreed_with, with_given, with_named
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
-from repair.problem.factory import part_in_reach
 from repair.problem.limits import Limits, reference_limits, resolve_limits
+from repair.problem.reach import part_in_reach
 from repair.reference.consistency import Recording
 from repair.reference.given import GivenReference, given_reference
 from repair.reference.registry import (
@@ -285,10 +285,11 @@ def _part_in_reach(
     until: float,
 ) -> Within | None:  # fmt: skip
     """The part of the road where the ego may be until a time [s]; None where nobody knows."""
-    places = None if given is None else given.positions
+    places, coordinates = (None, None) if given is None else (given.positions, given.within(scene.frame))
     if followed is not None:
-        places = scene.frame.to_cartesian(*followed.sample(scene.times).position.T)
-    return None if places is None else part_in_reach(scene, config.repair, limits, places, until)
+        coordinates = followed.sample(scene.times).position
+        places = scene.frame.to_cartesian(*coordinates.T)
+    return None if places is None else part_in_reach(scene, config.repair, limits, places, until, coordinates)
 
 
 def _boxes(

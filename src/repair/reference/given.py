@@ -69,6 +69,10 @@ class GivenReference:
     places: tuple[FrenetFrame, Array] | None = None
     heading: float | None = None
 
+    def within(self, frame: FrenetFrame) -> Array | None:
+        """The positions in a frame (K, 2) [m], if that is the one in which somebody has projected them."""
+        return self.places[1] if self.places is not None and self.places[0] is frame else None
+
     @property
     def positions(self) -> Array | None:
         """Positions (K, 2) along which the frame has to run [m]; None where it stays as it is."""
@@ -90,8 +94,7 @@ class GivenReference:
         if self.recording is None:
             assert self.path is not None
             return self.path
-        frame, places = self.places or (None, None)
-        return fit_recording(scene, self.recording, coordinates=places if frame is scene.frame else None)
+        return fit_recording(scene, self.recording, coordinates=self.within(scene.frame))
 
 
 def what_drives(thing: Any) -> Any:
