@@ -36,6 +36,7 @@ _OVER = 0.05  # who is over the edge by less is not stopped: how the body is tur
 _FAR = 1e4  # where the road never goes on [m]
 _SEEN = 60.0  # how much of a part off the road is looked at sideways [m]
 _SOME = 50  # of the fine places at a time
+_MORE = 40.0  # looked at beyond what is asked for, where a path is asked about again [m]
 
 _Inside = Callable[..., npt.NDArray[np.bool_]]
 
@@ -86,12 +87,22 @@ def dead_ends(
             found[near] = road.inside(np.stack([corners.real, corners.imag], axis=2))
         return found
 
+    if corridor is not None:
+        if corridor.clear[0] <= start and start + ahead + _COARSE <= corridor.clear[1]:
+            return []
+        more = _MORE if corridor.clear[0] <= start <= corridor.clear[1] else 0.0  # asked again and again
+    else:
+        more = 0.0
     low_x, low_y, high_x, high_y = road.region.bounds
-    s = start + np.arange(0.0, ahead + _COARSE, _COARSE)
+    s = start + np.arange(0.0, ahead + more + _COARSE, _COARSE)
     axis = np.zeros(len(s))
     on = np.zeros(len(s), dtype=np.bool_) if corridor is None else corridor.holds(s, *poses(s, axis))
     if not on.all():
         on[~on] = inside(s[~on], axis[~on], _OVER)
+    if corridor is not None and on[0]:
+        corridor.clear = start, float(s[-1] if on.all() else s[np.argmin(on) - 1])
+    within = s < start + ahead + _COARSE
+    s, on = s[within], on[within]
     if on.all():
         return []
     change = np.flatnonzero(np.diff(on.astype(np.int8)))

@@ -40,7 +40,14 @@ class RoadCorridor:
         The axis.
     vehicle : Vehicle
         The ego.
+
+    Attributes
+    ----------
+    clear : (float, float)
+        A part of the axis [m] along which the ego is known to be on the road; kept for whoever finds one.
     """
+
+    clear: tuple[float, float] = (np.inf, -np.inf)
 
     def __init__(self, road: RoadBoundary, frame: FrenetFrame, vehicle: Vehicle) -> None:
         self._half_length = np.array(vehicle.half_length)
