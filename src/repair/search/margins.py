@@ -10,6 +10,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from repair.check.verdict import Reason
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import too_close
 from repair.search.probe import Budget, Rejected
@@ -44,10 +47,13 @@ def probe_smaller(
     budget : Budget
     """
     enough: dict[Maneuver | None, float] = {}  # from which margin on a side may pass [m]
+    hopeless: set[tuple[object, ...]] = set()  # ways on which even what comes closest is too close
 
     def learn(failed: Rejected) -> None:
         for problem, one in failed:
             enough[_name(problem)] = min(enough.get(_name(problem), math.inf), _enough(problem, one))
+            if _in_vain(problem, one):
+                hopeless.add(_way(problem))
 
     learn(rejected)
     for problems in relaxed:
@@ -55,6 +61,8 @@ def probe_smaller(
             budget.cut = True
             break
         wanted = [p for p in problems if p.margin <= enough.get(_name(p), math.inf)]
+        if hopeless:
+            wanted = [p for p in wanted if _way(p) not in hopeless]
         if not wanted:
             continue
         again, failed = ask(wanted)
@@ -71,6 +79,30 @@ def _enough(problem: RepairProblem, failed: Probe) -> float:
         return -math.inf
     closest = failed.solve.closest
     return math.inf if closest is None or closest.miss <= 0.0 else problem.margin - closest.miss + _OFF
+
+
+def _in_vain(problem: RepairProblem, failed: Probe) -> bool:
+    """Whether the curve that keeps the most of the margin keeps too little of it for the checker.
+
+    One that has to keep less may come closer yet. Where it moves sideways it may also be another one, unless
+    too close is all that it was.
+    """
+    if failed.refused is None or not too_close(failed.refused):
+        return False
+    along = _name(problem) in (Maneuver.YIELD, Maneuver.GO_AHEAD)
+    return along or {v.reason for v in failed.refused.violations} <= {Reason.COLLISION, Reason.MARGIN}
+
+
+def _way(problem: RepairProblem) -> tuple[object, ...]:
+    """On which sides a problem's guide passes the obstacles, one after the other."""
+    if problem.passing is None:
+        return ()
+    sides = problem.passing.side
+    changes = np.diff(sides, axis=1, prepend=-1) != 0
+    return (
+        problem.passing.maneuver, *problem.occupancy.ids.tolist(),
+        *(tuple(row[new].tolist()) for row, new in zip(sides, changes, strict=True)),
+    )  # fmt: skip
 
 
 def with_margin(probe: Probe, again: Probe, margin: float) -> Probe:

@@ -171,16 +171,16 @@ def probe_one(
     budget.cut |= budget.limit is not None and solve.status is SolveStatus.TIME_LIMIT
     begin = budget.clock()
     try:
-        solve, verdict, margin = _judged(problem, solve, checker, t_rep)
+        solve, verdict, margin, refused = _judged(problem, solve, checker, t_rep)
     except OutOfTime:  # a curve that nobody has judged is none
-        budget.cut, margin = True, problem.margin
+        budget.cut, margin, refused = True, problem.margin, None
         detail = "a curve was found, and no time was left to judge it"
         solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
         verdict = _unsolved(solve, t_rep)
     maneuver = problem.passing.maneuver if problem.passing is not None else None
     if maneuver is None and backend.capabilities.own_way and solve.curve is not None:
         maneuver = taken(problem, solve.curve)
-    return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin)
+    return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin, refused=refused)
 
 
 def words(probe: Probe, tightened: Sequence[float] = ()) -> str:
@@ -201,10 +201,13 @@ def _amounts(room: float, edge: float, unused: float) -> str:
 
 def _judged(
     problem: RepairProblem, solve: SolveResult, checker: TrajectoryChecker, t_rep: float
-) -> tuple[SolveResult, Verdict, float]:
-    """What a backend found, what the checker says of it, and the margin it keeps [m]."""
+) -> tuple[SolveResult, Verdict, float, Verdict | None]:
+    """What a backend found, what the checker says of it, the margin it keeps [m], and what it refuses.
+
+    The last is its verdict on the curve that comes closest, where that was looked at.
+    """
     verdict = checker.check(problem, solve.curve) if solve.curve is not None else _unsolved(solve, t_rep)
-    margin = problem.margin
+    margin, refused = problem.margin, None
     closest = None if verdict.ok else solve.closest
     while closest is not None:
         # What the backend says of the problem stays; but boxes are wider than vehicles, and the checker
@@ -216,9 +219,10 @@ def _judged(
                 detail = f"{solve.detail}; {closest.what} passes every check, with a margin of {margin:.2f} m"
                 residuals = closest.residuals or solve.residuals
                 solve = replace(solve, curve=closest.curve, detail=detail, residuals=residuals)
-                return solve, again, margin
+                return solve, again, margin, None
+            refused = refused or again
         closest = closest.instead
-    return solve, verdict, margin
+    return solve, verdict, margin, refused
 
 
 def better(new: Probe, old: Probe) -> bool:

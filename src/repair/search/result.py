@@ -43,6 +43,8 @@ class Probe:
         Whether ``by`` was asked because the search had ended without a repair.
     tightened : (3,) tuple of float
         By what the problem was tightened: room [m], road [m], limits (share).
+    refused : Verdict or None
+        The checker's on the curve that comes closest, where that is no repair either.
     """
 
     t_rep: float
@@ -56,6 +58,7 @@ class Probe:
     jump: float = 0.0
     fallback: bool = False
     tightened: tuple[float, ...] = (0.0, 0.0, 0.0)
+    refused: Verdict | None = None
 
     @property
     def feasible(self) -> bool:
