@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repair.check.verdict import Reason
+from repair.check.verdict import Reason, Verdict
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.search.again import too_close
 from repair.search.probe import Budget, Rejected
@@ -23,6 +23,10 @@ __all__ = ["probe_smaller", "with_margin"]
 #: Ways past and windows change with the margin, and what is missed with them [m]. With this no answer of 111
 #: searches at 0.1 s and 99 at 0.4 s was another one than with all margins; with 1 m one was, a step earlier.
 _OFF = 1.5
+#: Where the guide passes the same obstacles on the same sides, what is missed changes by less [m].
+_NEAR = 0.1
+
+_Way = tuple[object, ...]
 
 
 def probe_smaller(
@@ -46,23 +50,26 @@ def probe_smaller(
         Solves and checks problems of one margin: the best of them, and those that failed.
     budget : Budget
     """
-    enough: dict[Maneuver | None, float] = {}  # from which margin on a side may pass [m]
-    hopeless: set[tuple[object, ...]] = set()  # ways on which even what comes closest is too close
+    enough: dict[_Way, float] = {}  # from which margin on a side, or a way, may pass [m]
 
     def learn(failed: Rejected) -> None:
         for problem, one in failed:
-            enough[_name(problem)] = min(enough.get(_name(problem), math.inf), _enough(problem, one))
-            if _in_vain(problem, one):
-                hopeless.add(_way(problem))
+            side = _side(problem)
+            enough[side] = min(enough.get(side, math.inf), _enough(problem, one, _OFF))
+            if one.refused is not None and too_close(one.refused):
+                way = _way(problem)
+                known = -math.inf if _in_vain(problem, one.refused) else _enough(problem, one, _NEAR)
+                enough[way] = min(enough.get(way, math.inf), known)
 
     learn(rejected)
     for problems in relaxed:
         if budget.spent:
             budget.cut = True
             break
-        wanted = [p for p in problems if p.margin <= enough.get(_name(p), math.inf)]
-        if hopeless:
-            wanted = [p for p in wanted if _way(p) not in hopeless]
+        wanted = [
+            p for p in problems
+            if all(p.margin <= enough.get(way(p), math.inf) for way in (_side, _way))
+        ]  # fmt: skip
         if not wanted:
             continue
         again, failed = ask(wanted)
@@ -73,27 +80,29 @@ def probe_smaller(
     return probe
 
 
-def _enough(problem: RepairProblem, failed: Probe) -> float:
-    """The largest margin with which a side that failed may pass [m]."""
+def _enough(problem: RepairProblem, failed: Probe, off: float) -> float:
+    """The largest margin with which a side that failed may pass, where what it misses may be off [m]."""
     if failed.solve.curve is not None and too_close(failed.verdict):
         return -math.inf
     closest = failed.solve.closest
-    return math.inf if closest is None or closest.miss <= 0.0 else problem.margin - closest.miss + _OFF
+    return math.inf if closest is None or closest.miss <= 0.0 else problem.margin - closest.miss + off
 
 
-def _in_vain(problem: RepairProblem, failed: Probe) -> bool:
-    """Whether the curve that keeps the most of the margin keeps too little of it for the checker.
+def _in_vain(problem: RepairProblem, refused: Verdict) -> bool:
+    """Whether no margin is of use where the curve that keeps the most of it is too close for the checker.
 
-    One that has to keep less may come closer yet. Where it moves sideways it may also be another one, unless
+    One that has to keep less comes closer yet. Where it moves sideways it may also be another one, unless
     too close is all that it was.
     """
-    if failed.refused is None or not too_close(failed.refused):
-        return False
-    along = _name(problem) in (Maneuver.YIELD, Maneuver.GO_AHEAD)
-    return along or {v.reason for v in failed.refused.violations} <= {Reason.COLLISION, Reason.MARGIN}
+    along = problem.passing is not None and problem.passing.maneuver in (Maneuver.YIELD, Maneuver.GO_AHEAD)
+    return along or {v.reason for v in refused.violations} <= {Reason.COLLISION, Reason.MARGIN}
 
 
-def _way(problem: RepairProblem) -> tuple[object, ...]:
+def _side(problem: RepairProblem) -> _Way:
+    return () if problem.passing is None else (problem.passing.maneuver,)
+
+
+def _way(problem: RepairProblem) -> _Way:
     """On which sides a problem's guide passes the obstacles, one after the other."""
     if problem.passing is None:
         return ()
@@ -109,7 +118,3 @@ def with_margin(probe: Probe, again: Probe, margin: float) -> Probe:
     """A probe after another one with some margin [m], which is the answer if it is feasible."""
     tried = (*probe.tried, *(f"{text} (margin {margin:g} m)" for text in again.tried))
     return replace(again if again.feasible else probe, tried=tried)
-
-
-def _name(problem: RepairProblem) -> Maneuver | None:
-    return None if problem.passing is None else problem.passing.maneuver
