@@ -26,6 +26,9 @@ _OFF = 1.5
 #: Where the guide passes the same obstacles on the same sides, what is missed changes by less [m].
 _NEAR = 0.1
 
+#: A guide that is no farther from the reference [m] leads into what the reference meets.
+_PLANNED = 0.3
+
 _Way = tuple[object, ...]
 
 
@@ -69,6 +72,7 @@ def probe_smaller(
         wanted = [
             p for p in problems
             if all(p.margin <= enough.get(way(p), math.inf) for way in (_side, _way))
+            and not (budget.collides and _as_planned(p))
         ]  # fmt: skip
         if not wanted:
             continue
@@ -96,6 +100,14 @@ def _in_vain(problem: RepairProblem, refused: Verdict) -> bool:
     """
     along = problem.passing is not None and problem.passing.maneuver in (Maneuver.YIELD, Maneuver.GO_AHEAD)
     return along or {v.reason for v in refused.violations} <= {Reason.COLLISION, Reason.MARGIN}
+
+
+def _as_planned(problem: RepairProblem) -> bool:
+    """Whether a guide follows the reference: so much of the boxes is gone that nothing is in its way."""
+    if problem.passing is None:
+        return False
+    guide = problem.passing.guide
+    return bool(np.abs(guide.position - problem.reference.sample(guide.t).position).max() <= _PLANNED)
 
 
 def _side(problem: RepairProblem) -> _Way:

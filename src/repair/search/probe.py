@@ -96,6 +96,8 @@ class Budget:
     cut: bool = False  # the last probe would have gone on, had there been time
     # the sides of feasible t_rep that nobody was asked for yet, as another one had passed
     unasked: dict[float, Sequence[RepairProblem]] = field(default_factory=dict)
+    # whether the reference meets an obstacle
+    collides: bool = False
     # what passed in an earlier search that is much like this one: its side is asked first, as tight
     like: Probe | None = None
 

@@ -207,7 +207,10 @@ def search_f_ttr(
         end = min(end, max(settings.upper, settings.delta_t * 1e-3))
     probes: list[Probe] = []
     complete = True
-    budget = Budget(settings.time_limit, begin, clock, hopeless if settings.proofs else None, like=like)
+    budget = Budget(
+        settings.time_limit, begin, clock, hopeless if settings.proofs else None,
+        collides=conflict.contact_time < float("inf"), like=like,
+    )  # fmt: skip
     try:
         for probe in iter_probes(source, backend, checker, end, settings, budget, visits, after):
             probes.append(probe)
