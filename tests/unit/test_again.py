@@ -56,10 +56,10 @@ class Demanding:
         return Verdict(tuple(Violation(reason, problem.t_rep) for reason in missed))
 
 
-def searched(checker, source=None, backend=None, **settings):
+def searched(checker, source=None, backend=None, like=None, **settings):
     keys = SearchConfig(upper=0.0, **settings)
     source = source or Tightening()
-    return search_f_ttr(source, Conflict(2.0, "margin"), backend or FakeBackend(), checker, keys)
+    return search_f_ttr(source, Conflict(2.0, "margin"), backend or FakeBackend(), checker, keys, like=like)
 
 
 @pytest.mark.parametrize(
@@ -112,6 +112,34 @@ def test_the_first_of_the_tightened_sides_that_passes_is_taken():
         backend = FakeBackend(costs={Maneuver.YIELD: 2.0, Maneuver.LEFT: 1.0})
         result = searched(Demanding({Reason.LIMITS: missed}), source, backend, sides="best")
         assert result.probes[0].maneuver is wanted
+
+
+def test_what_passed_before_is_asked_first_as_tight():
+    before = searched(Demanding({Reason.MARGIN: 0.5})).probes[0]
+    assert before.tightened == (0.6, 0.0, 0.0)
+    checker = Demanding({Reason.MARGIN: 0.4})
+    (probe,) = searched(checker, like=before).probes
+    assert checker.seen == [(0.6, 0.0, 0.0)]
+    assert (probe.tried, probe.tightened) == (("yield: feasible (margin +0.6 m)",), before.tightened)
+    # not of another side
+    checker = Demanding({})
+    assert searched(checker, Tightening((Maneuver.LEFT,)), like=before).probes[0].tightened == (0.0, 0.0, 0.0)
+    assert checker.seen == [(0.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("needs", [{Reason.OFF_ROAD: 0.2}, {Reason.MARGIN: 0.6, Reason.OFF_ROAD: 0.1}])
+def test_where_that_does_not_pass_the_answer_is_as_if_it_was_not_known(needs):
+    before = searched(Demanding({Reason.MARGIN: 0.5})).probes[0]
+    alone, checker = searched(Demanding(needs)).probes[0], Demanding(needs)
+    (probe,) = searched(checker, like=before).probes
+    assert (probe.verdict, probe.tried, probe.tightened) == (alone.verdict, alone.tried, alone.tightened)
+
+
+def test_nothing_is_asked_twice_for_it():
+    before = searched(Demanding({Reason.MARGIN: 0.5})).probes[0]
+    checker = Demanding({Reason.MARGIN: 9.0})
+    assert searched(checker, like=before).status is SearchStatus.NONE_FEASIBLE
+    assert checker.seen == [(0.6, 0.0, 0.0), (0.0, 0.0, 0.0), (0.3, 0.0, 0.0)]
 
 
 def test_larger_margins_may_show_another_way():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from repair.curves.base import FrenetTrajectory
 from repair.scene.frame import FrenetFrame
 from repair.scene.traffic.obstacle import Obstacle
 from repair.world.boxes import Occupancy, shrink_to_start
-from repair.world.occupancy import build_occupancy, first_entry, relevant
+from repair.world.occupancy import Within, build_occupancy, first_entry, relevant
 
 STRAIGHT = FrenetFrame.from_points([[0.0, 0.0], [200.0, 0.0]])
 _TURN = np.linspace(0.0, 0.5 * np.pi, 60)
@@ -108,6 +109,39 @@ def test_no_obstacles_is_no_error():
     assert notes == ()
     assert first_entry(boxes, path([0.0, 1.0], 5.0, 0.0)) is None
     assert len(relevant(boxes, 0.0, 1.0, np.array([0.0, 1.0]), np.array([0.0, 1.0]))) == 0
+
+
+@pytest.mark.parametrize("frame", [STRAIGHT, BEND])
+def test_who_is_left_out_is_out_of_reach(frame):
+    """Behind, too far ahead for the time, or too far aside; everybody else has their usual box."""
+    rng = np.random.default_rng(5)
+    steps, start, aside = 12, 30.0, 3.0
+    ways = 2.0 + 4.0 * np.arange(steps)
+    within = Within(start, start - 5.0, start + ways[-1] + 5.0, aside, ways)
+    left_out = 0
+    for turn in range(40):
+        s, l = rng.uniform(-15.0, 1.2 * frame.length), rng.uniform(-12.0, 12.0)  # noqa: E741
+        x, y = frame.to_cartesian(s, l)
+        heading, v = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 25.0)
+        size = (rng.uniform(1.0, 12.0), rng.uniform(0.5, 3.0))
+        rows = [
+            (x + 0.1 * k * v * np.cos(heading), y + 0.1 * k * v * np.sin(heading), heading, *size)
+            for k in range(steps)
+        ]
+        one = replace(
+            obstacle(rows, turn, "static" if turn % 5 == 0 else "dynamic"),
+            rectangles=np.array(rows) * [1.0, 1.0, 1.0, 0.5, 0.5],
+        )
+        (whole, _), (part, _) = (build_occupancy([one], frame, 0.1, 2.0, 1.0, w) for w in (None, within))
+        known = np.isfinite(part.lower[0, :, 0])
+        np.testing.assert_allclose(part.lower[0, known], whole.lower[0, known], atol=1e-8)
+        np.testing.assert_allclose(part.upper[0, known], whole.upper[0, known], atol=1e-8)
+        left_out += int((~known).sum())
+        with np.errstate(invalid="ignore"):
+            met = (whole.upper[0, :, 0] > start) & (whole.lower[0, :, 0] < start + ways)
+            met &= (whole.upper[0, :, 1] > -aside) & (whole.lower[0, :, 1] < aside)
+        assert known[met].all()
+    assert left_out > 150
 
 
 def test_absence_is_nan_and_not_noted():

@@ -130,6 +130,37 @@ def test_the_corridor_settles_places_and_changes_no_end(tmp_path: Path) -> None:
     np.testing.assert_array_equal(quick, plain)
 
 
+def test_a_part_that_is_known_to_be_clear_is_not_looked_at_again(tmp_path: Path) -> None:
+    scene = loaded(tmp_path, roads.strip(1, straight(-50.0, 150.0)), 12.0, 8.0)
+    checker = answer(scene, "ego").prepared.checker
+    corridor, begin = checker.edge.corridor, float(scene.start[0, 0])
+    asked = []
+
+    class Seen:
+        def __init__(self) -> None:
+            self.clear = (np.inf, -np.inf)
+
+        def holds(self, s, *pose):
+            asked.append((float(s[0]), float(s[-1])))
+            return corridor.holds(s, *pose)
+
+    seen = Seen()
+    for k in range(150):  # a metre each, up to the end of the road and past it
+        start = begin + k
+        ends = [
+            dead_ends(checker.road, scene.frame, scene.vehicle, scene.road, start, 40.0, how)
+            for how in (None, seen)
+        ]
+        np.testing.assert_allclose(ends[1], ends[0])
+        assert seen.clear[0] <= start
+    assert len(ends[0]) == 0
+    far = [last for _, last in asked]
+    assert len([last for last in far if last < begin + 100.0]) <= 3
+    # and back again
+    assert dead_ends(checker.road, scene.frame, scene.vehicle, scene.road, begin - 3.0, 40.0, seen) == []
+    assert seen.clear[0] == begin - 3.0
+
+
 def test_the_way_around_an_end_is_the_nearest_that_is_free_all_along(tmp_path: Path) -> None:
     road = roads.strip(1, straight(-50.0, 50.0), more='<adjacentLeft ref="2" drivingDir="same"/>')
     road += roads.strip(2, straight(-50.0, 50.0, 4.0), after=[3],

@@ -609,16 +609,24 @@ def test_the_last_feasible_curve_is_offered_as_a_warm_start_where_it_is_of_use()
 class Relaxing(FakeSource):
     """The problems with smaller margins; some manoeuvres open with a smaller one only."""
 
-    def __init__(self, *margins, opens=None, strict=False):
+    def __init__(self, *margins, opens=None, strict=False, slower=5.0, sides=None):
         super().__init__()
         self.margins, self.opens, self.strict = margins, opens or {}, strict
+        self.guide = toy.constant(10.0 - slower).sample(np.arange(3.0))
+        self.sides = sides or {}  # of one box, from a margin on down
 
     def at(self, t_rep, margin=0.1):
+        box, sides = toy.occupancy(toy.box((50, 55), (-1, 1))), [0, 0, 0]
+        for least, others in self.sides.items():
+            sides = others if margin <= least else sides
         return tuple(
-            replace(problem, margin=margin, strict=self.strict)
+            replace(
+                problem, margin=margin, strict=self.strict, occupancy=box,
+                passing=replace(problem.passing, guide=self.guide, sides=np.array([sides], dtype=np.int8)),
+            )
             for problem in super().at(t_rep)
             if margin <= self.opens.get(problem.passing.maneuver, math.inf)
-        )
+        )  # fmt: skip
 
     def relaxed(self, t_rep):
         return (self.at(t_rep, margin) for margin in self.margins)
@@ -664,8 +672,14 @@ def test_smaller_margins_are_asked_for_where_they_may_help():
     )  # fmt: skip
     source = Relaxing(-0.1, -0.3, -1.3, -4.0)
     source.maneuvers = (Maneuver.LEFT, Maneuver.RIGHT, Maneuver.YIELD)
-    checker = FakeChecker(lambda problem: problem.passing.maneuver is Maneuver.LEFT and problem.margin < -2.0)
-    (probe,) = search(checker, source=source, backend=backend, upper=0.0).probes
+
+    class Judge:
+        def check(self, problem, curve):
+            if problem.passing.maneuver is not Maneuver.LEFT:
+                return Verdict((Violation(Reason.COLLISION, problem.t_rep),))
+            return Verdict() if problem.margin < -2.0 else Verdict((Violation(Reason.LIMITS, problem.t_rep),))
+
+    (probe,) = search(Judge(), source=source, backend=backend, upper=0.0).probes
     margins = {name: [] for name in ("left", "right", "yield")}
     for text in probe.tried[3:]:
         name, _, rest = text.partition(": ")
@@ -675,6 +689,55 @@ def test_smaller_margins_are_asked_for_where_they_may_help():
     assert margins["right"] == ["collision (margin -0.1 m)"]
     # nobody knows by how much it misses
     assert margins["yield"] == [f"not_solved (margin {m:g} m)" for m in (-0.1, -0.3, -1.3, -4.0)]
+
+
+def asked_margins(maneuver, reasons, sides=None, slower=5.0, contact=2.95):
+    """The margins that a side is asked for that misses 0.4 m, its closest curve being refused for reasons."""
+    backend = Narrow({maneuver: -0.3}, says={maneuver}, capabilities=Capabilities(relaxes=True))
+    source = Relaxing(-0.1, -0.22, -0.3, sides=sides, slower=slower)
+    source.maneuvers = (maneuver,)
+
+    class Refusing:
+        def check(self, problem, curve):
+            missed = reasons if problem.margin > -0.25 else (Reason.OFF_ROAD,)
+            return Verdict(tuple(Violation(reason, problem.t_rep) for reason in missed))
+
+    conflict = Conflict(2.9, "margin", 7, contact)
+    (probe,) = search(Refusing(), source=source, backend=backend, upper=0.0, conflict=conflict).probes
+    return [float(text.rpartition("margin ")[2].removesuffix(" m)")) for text in probe.tried[1:]]
+
+
+ALL = [-0.1, -0.22, -0.3]
+
+
+@pytest.mark.parametrize(
+    "maneuver, reasons, margins",
+    [
+        (Maneuver.YIELD, (Reason.COLLISION,), []),  # nothing is less close than what comes closest
+        (Maneuver.GO_AHEAD, (Reason.MARGIN, Reason.LIMITS), []),
+        (Maneuver.LEFT, (Reason.MARGIN,), []),
+        (Maneuver.LEFT, (Reason.MARGIN, Reason.LIMITS), [-0.22, -0.3]),  # 0.3 m less, within 0.1 m
+        (Maneuver.LEFT, (Reason.LIMITS,), ALL),
+        (Maneuver.YIELD, (Reason.OFF_ROAD,), ALL),
+    ],
+)
+def test_a_way_on_which_what_comes_closest_is_too_close_is_not_asked_in_vain(maneuver, reasons, margins):
+    assert asked_margins(maneuver, reasons) == margins
+
+
+def test_another_way_past_the_same_obstacles_is_asked():
+    too_close = (Reason.COLLISION,)
+    assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1]}) == [-0.22]
+    assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1], -0.3: [2, 2, 1]}) == [-0.22, -0.3]
+    assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 0, 0]}) == []
+    assert asked_margins(Maneuver.LEFT, (Reason.MARGIN, Reason.LIMITS), {-0.1: [2, 2, 2]}) == ALL
+
+
+def test_a_guide_that_follows_the_reference_into_what_it_meets_is_not_asked():
+    assert asked_margins(Maneuver.YIELD, (Reason.LIMITS,), slower=0.1) == []
+    assert asked_margins(Maneuver.YIELD, (Reason.LIMITS,), slower=0.2) == ALL
+    # of a reference that exceeds a limit it may be what helps
+    assert asked_margins(Maneuver.YIELD, (Reason.LIMITS,), slower=0.1, contact=math.inf) == ALL
 
 
 def test_a_side_that_opens_with_a_smaller_margin_is_asked():
