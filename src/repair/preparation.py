@@ -23,8 +23,7 @@ from repair.config.agreed import agreed_with, with_given, with_named
 from repair.config.schema import Config, require_types
 from repair.curves.base import Curve
 from repair.errors import ConfigError, ScenarioError, kind_of
-from repair.problem.limits import Limits, reference_limits, resolve_limits
-from repair.problem.reach import part_in_reach
+from repair.problem.limits import Limits, part_in_reach, reference_limits, resolve_limits
 from repair.reference.consistency import Recording
 from repair.reference.given import GivenReference, given_reference
 from repair.reference.registry import (
@@ -285,19 +284,18 @@ def _part_in_reach(
     until: float,
 ) -> Within | None:  # fmt: skip
     """The part of the road where the ego may be until a time [s]; None where nobody knows."""
-    places, coordinates = (None, None) if given is None else (given.positions, given.within(scene.frame))
+    places, known = (None, None) if given is None else (given.positions, given.within(scene.frame))
     if followed is not None:
-        coordinates = followed.sample(scene.times).position
-        places = scene.frame.to_cartesian(*coordinates.T)
-    return None if places is None else part_in_reach(scene, config.repair, limits, places, until, coordinates)
+        known = followed.sample(scene.times).position
+        places = scene.frame.to_cartesian(*known.T)
+    return None if places is None else part_in_reach(scene, config.repair, limits, places, until, known)
 
 
 def _boxes(
     scene: Scene, offsets: tuple[float, float], within: Callable[[], Within | None] | None
 ) -> tuple[Occupancy, tuple[str, ...]]:
     """The traffic as boxes, and who is not seen by them."""
-    part = None if within is None else within()
-    return build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets, part)
+    return build_occupancy(scene.obstacles, scene.frame, scene.dt, *offsets, within and within())
 
 
 def _said(

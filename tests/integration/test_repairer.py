@@ -121,6 +121,28 @@ def test_nothing_is_said_to_be_feasible_only_where_all_has_been_tried(scene, gue
     assert (cut.status, cut.complete) == (SearchStatus.BUDGET_EXHAUSTED, False)
 
 
+def test_what_passed_a_cycle_ago_is_asked_first_where_it_is_likely_to_pass_again(scene):
+    prepared = repair.Repairer(scene, overrides=["search.delta_t=0.1"]).update(plan(scene)).prepared
+    own, asked = make_backend("ego", prepared.config), {}
+
+    class Seen:
+        name, capabilities = "ego", replace(own.capabilities, fallbacks=None)
+
+        def solve(self, problem, **keys):
+            asked.setdefault(round(problem.t_rep, 6), []).append(round(problem.margin - usual, 6))
+            return own.solve(problem, **keys)
+
+    usual, settings = prepared.settings.margin, replace(prepared.config.search, rule="bisect")
+    alone = searched(prepared, Seen(), settings, guess=0.0)
+    assert not alone.best.tightened[0]
+    asked.clear()
+    like = replace(alone.best, tightened=(0.3, 0.0, 0.0)), 0.25
+    found = searched(prepared, Seen(), settings, guess=0.0, like=like)
+    assert found.f_ttr == alone.f_ttr
+    assert {t for t, margins in asked.items() if margins[0] == 0.3} == {0.0, 0.1} & set(asked)
+    assert asked[0.0] == [0.3]  # and passes
+
+
 def test_what_is_driven_touches_nothing(scene):
     """By shapely, against the recorded rectangles, at each step of each cycle."""
     watch = repair.Repairer(scene, backend="ego")

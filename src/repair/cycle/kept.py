@@ -17,7 +17,7 @@ from repair.scene.frame import FrenetFrame
 from repair.search.result import Probe, SearchResult
 from repair.timegrid import INSTANT, on_grid
 
-__all__ = ["KeptRepair", "Later", "verified_again"]
+__all__ = ["KeptRepair", "Later", "hints", "verified_again"]
 
 _PLACE_OFF, _SPEED_OFF = (
     0.02,
@@ -92,20 +92,39 @@ class KeptRepair:
         """What is left of its time-to-repair [s]; negative once it is past."""
         return self.f_ttr - (now - self.now)
 
-    def guess(self, now: float, step: float) -> float:
-        """In the middle between what was feasible and what was not, of a grid of so many seconds [s]."""
-        return 0.5 * (self.due(now) + self.late(now, step))
-
-    def late(self, now: float, step: float) -> float:
-        """When nothing was feasible any more, of a grid of so many seconds [s]."""
-        return min(self.failed, self.f_ttr + step) - (now - self.now)
-
     def beside(self, found: SearchResult, now: float, last: KeptRepair | None = None) -> KeptRepair:
         """The same with what a search, and the repair that was kept before, know of later t_rep."""
         failed = [p.t_rep + now for p in found.probes if found.complete and not p.feasible]
         failed += [one.failed + one.now for one in (self, last) if one is not None]
         own = self.f_ttr + self.now
         return replace(self, failed=min(at for at in (*failed, math.inf) if at > own) - self.now)
+
+
+def hints(
+    last: KeptRepair | None, now: float, step: float
+) -> tuple[float | None, tuple[Probe, float] | None]:
+    """Where a search begins that follows another one, and what is asked there first.
+
+    Parameters
+    ----------
+    last : KeptRepair or None
+    now : float
+        When the cycle begins [s].
+    step : float
+        Of the times-to-repair [s].
+
+    Returns
+    -------
+    guess : float or None
+        In the middle between what was feasible and what was not [s]; None where all of that is past.
+    like : (Probe, float) or None
+        What passed, and before when [s] that is likely.
+    """
+    if last is None:
+        return None, None
+    late = min(last.failed, last.f_ttr + step) - (now - last.now)
+    due = last.due(now)
+    return None if due < 0.0 else 0.5 * (due + late), None if last.probe is None else (last.probe, late)
 
 
 def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[float, Curve] | None:

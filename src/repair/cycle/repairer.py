@@ -24,7 +24,7 @@ from repair.curves.base import Curve, SplicedCurve, is_curve
 from repair.cycle.asked import Asked, Others, require_deadline, since, spare, step_of
 from repair.cycle.cycle import Cycle
 from repair.cycle.ego import ego_of
-from repair.cycle.kept import KeptRepair, verified_again
+from repair.cycle.kept import KeptRepair, hints, verified_again
 from repair.cycle.paced import LEAST, Pace, Paced
 from repair.cycle.ready import configured, made_ready, not_asked
 from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
@@ -264,14 +264,10 @@ class Repairer:
                         prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
                     with phases("problem"):
                         self._source(prepared)
-                guess, like, step = None, None, self.config.search.delta_t
-                if last is not None and refuted and last.due(asked.now) >= 0.0:
-                    guess = last.guess(asked.now, step)
-                if last is not None and last.probe is not None:
-                    like = last.probe, last.late(asked.now, step)
+                guess, like = hints(last, asked.now, self.config.search.delta_t)
                 found = searched(
-                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0], guess,
-                    thorough=True, like=like,
+                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
+                    guess if refuted else None, thorough=True, like=like,
                 )  # fmt: skip
                 if found.probes:
                     longest = max(probe.check_time for probe in found.probes)
@@ -339,12 +335,8 @@ class Repairer:
         curve: Curve = prepared.reference
         if part is not None and f_ttr is not None:
             curve = SplicedCurve(prepared.reference, part, f_ttr)
-            last = self._kept
-            if not is_kept or last is None:
-                new = KeptRepair(part, f_ttr, asked.now, prepared.scene.frame, found.best)
-                self._kept = new.beside(found, asked.now, last)
-            else:
-                self._kept = last.beside(found, asked.now)
+            new = KeptRepair(part, f_ttr, asked.now, prepared.scene.frame, found.best)
+            self._kept = (self._kept if is_kept and self._kept else new).beside(found, asked.now, self._kept)
         elif refuted and found.status is not SearchStatus.NO_CONFLICT:
             self._kept = None
         return Cycle(

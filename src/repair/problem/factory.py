@@ -11,10 +11,9 @@ import numpy as np
 
 from repair.arrays import Array, frozen
 from repair.curves.base import Curve, FrenetTrajectory
-from repair.problem.limits import Limits
+from repair.problem.limits import Limits, room_of
 from repair.problem.passing import open_passings
 from repair.problem.problem import Afterwards, Maneuver, Passing, RepairProblem
-from repair.problem.reach import room_of
 from repair.problem.settings import RepairConfig
 from repair.problem.shapes import Shapes
 from repair.problem.speeds import Bends, speed_profiles
