@@ -28,7 +28,7 @@ from repair.cycle.kept import KeptRepair, hints, verified_again
 from repair.cycle.paced import LEAST, Pace, Paced
 from repair.cycle.ready import configured, made_ready, not_asked
 from repair.cycle.scenery import fits, in_frame, scene_now, scene_of
-from repair.cycle.searching import searched
+from repair.cycle.searching import Unproven, searched
 from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, kind_of
 from repair.preparation import Prepared, among, laid_out
@@ -248,17 +248,23 @@ class Repairer:
 
     def _answered(self, prepared: Prepared, asked: Asked) -> Cycle:
         """What was kept, if it still holds, and what is found beside it."""
-        kept, refuted, phases = None, False, asked.phases
+        phases, held = asked.phases, list[tuple[float, Curve] | None]()
         found = SearchResult(
             SearchStatus.BUDGET_EXHAUSTED, prepared.conflict, None, None, complete=False, wall_time=0.0
         )
         last = self._kept
+
+        def verify() -> bool:
+            if not held and last is not None:
+                with phases("kept"):
+                    held.append(verified_again(last, prepared, asked.now))
+            return bool(held) and held[0] is not None
+
         try:
             with until(asked.at):
-                if last is not None:
-                    with phases("kept"):
-                        kept = verified_again(last, prepared, asked.now)
-                    refuted = kept is None
+                unproven = None if last is None else Unproven(max(last.due(asked.now), 0.0), verify)
+                if unproven is not None and asked.at is not None:  # what there is already comes first
+                    unproven.asked()
                 if np.isfinite(prepared.conflict.time):
                     with phases("occupancy"):
                         prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
@@ -266,15 +272,14 @@ class Repairer:
                         self._source(prepared)
                 guess, like = hints(last, asked.now, self.config.search.delta_t)
                 found = searched(
-                    prepared, self._backend, self._limited(asked), None if kept is None else kept[0],
-                    guess if refuted else None, thorough=True, like=like,
-                )  # fmt: skip
+                    prepared, self._backend, self._limited(asked), unproven, guess, thorough=True, like=like
+                )
                 if found.probes:
                     longest = max(probe.check_time for probe in found.probes)
                     self._paces.setdefault("judging", Pace()).took(longest)
         except OutOfTime:
             pass
-        return self._answer(prepared, found, kept, refuted, asked)
+        return self._answer(prepared, found, held[0] if held else None, held == [None], asked)
 
     def _source(self, prepared: Prepared) -> Any:
         return prepared.unguided if self._backend.capabilities.own_way else prepared.source

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,14 +16,38 @@ from repair.search.rules import CONTIGUOUS, around
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT, intervals
 
-__all__ = ["searched"]
+__all__ = ["Unproven", "searched"]
+
+
+@dataclass
+class Unproven:
+    """A time-to-repair at which there was a verified repair, until that is asked for again.
+
+    Attributes
+    ----------
+    due : float
+        [s].
+    verify : callable
+        Whether it still is one.
+    holds : bool or None
+        What that said; None where nobody has asked.
+    """
+
+    due: float
+    verify: Callable[[], bool]
+    holds: bool | None = None
+
+    def asked(self) -> float | None:
+        """The time-to-repair, if it holds."""
+        self.holds = self.verify()
+        return self.due if self.holds else None
 
 
 def searched(
     prepared: Prepared,
     backend: RepairBackend,
     settings: SearchConfig,
-    kept: float | None = None,
+    kept: float | Unproven | None = None,
     guess: float | None = None,
     *,
     thorough: bool = False,
@@ -39,8 +63,9 @@ def searched(
     prepared : Prepared
     backend : RepairBackend
     settings : SearchConfig
-    kept : float, optional
-        A time-to-repair at which there is a verified repair [s]: later ones are searched for.
+    kept : float or Unproven, optional
+        A time-to-repair at which there is a verified repair [s]: later ones are searched for. One that is
+        unproven needs no proof where the search finds something later, at ``guess``.
     guess : float, optional
         Where it was a cycle ago [s]; with a rule that takes feasibility to be contiguous the search begins
         there, by default at the one that follows ``kept``.
@@ -58,7 +83,7 @@ def searched(
     """
     begin = time.perf_counter()
     found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe, like)
-    nothing = kept is None and found.complete and found.status is SearchStatus.NONE_FEASIBLE
+    nothing = not _holds(kept) and found.complete and found.status is SearchStatus.NONE_FEASIBLE
     if thorough and nothing and settings.rule in CONTIGUOUS:
         return _the_rest(prepared, backend, settings, begin, found)
     return found
@@ -68,7 +93,7 @@ def _searched(
     prepared: Prepared,
     backend: RepairBackend,
     settings: SearchConfig,
-    kept: float | None,
+    kept: float | Unproven | None,
     guess: float | None,
     above: float | None,
     stride: float | None,
@@ -79,16 +104,18 @@ def _searched(
     end = _end(prepared, settings)
     if settings.rule not in CONTIGUOUS:
         guess = None
+    if isinstance(kept, Unproven) and (guess is None or end <= 0.0):
+        kept = kept.asked()
+        guess = guess if kept is None else None
     if (kept is None and guess is None) or not np.isfinite(end) or end <= 0.0:
         return find(prepared, backend, settings=settings, on_probe=on_probe)
     begin = time.perf_counter()
     step = settings.delta_t
-    known = -1 if kept is None else int(np.floor(kept / step + INSTANT))
-    first = known + 1 if guess is None else int(np.floor(guess / step + INSTANT))
     size = intervals(end, step)
     if above is not None:
-        size = min(size, max(int(np.ceil(above / step - INSTANT)), known + 1))
-    order = around(first, known, size, 1 if stride is None else max(round(stride / step), 1))
+        least = 0 if kept is None else _point(kept.due if isinstance(kept, Unproven) else kept, step) + 1
+        size = min(size, max(int(np.ceil(above / step - INSTANT)), least))
+    order = _visits(kept, guess, step, size, 1 if stride is None else max(round(stride / step), 1))
     probes: tuple[Probe, ...] = ()
     complete, k = True, next(order, None)
     while k is not None and complete:
@@ -102,7 +129,7 @@ def _searched(
         except StopIteration:
             k = None
     best = max((p for p in probes if p.feasible), key=lambda p: p.t_rep, default=None)
-    if best is None and complete and kept is None and backend.capabilities.fallbacks is not None:
+    if best is None and complete and not _holds(kept) and backend.capabilities.fallbacks is not None:
         return find(prepared, backend, settings=_left(settings, begin))  # which asks the fallbacks
     spent = time.perf_counter() - begin
     if best is None:
@@ -113,6 +140,33 @@ def _searched(
     return SearchResult(
         SearchStatus.FOUND, prepared.conflict, best.t_rep, best.solve.curve, probes, complete, spent
     )
+
+
+def _visits(
+    kept: float | Unproven | None, guess: float | None, step: float, size: int, stride: int
+) -> Generator[int, bool, None]:
+    """The points of the grid; with something unproven the guess first, if that is later."""
+    if isinstance(kept, Unproven):
+        first = _point(kept.due if guess is None else guess, step)
+        if kept.due + INSTANT < first * step and first < size:
+            if (yield first):
+                kept, guess = first * step, None
+            else:
+                size, kept = first, kept.asked()
+                guess = (first - 1) * step if kept is None else None
+        else:
+            kept = kept.asked()
+            guess = guess if kept is None else None
+    known = -1 if kept is None else _point(kept, step)
+    yield from around(known + 1 if guess is None else _point(guess, step), known, size, stride)
+
+
+def _point(t_rep: float, step: float) -> int:
+    return int(np.floor(t_rep / step + INSTANT))
+
+
+def _holds(kept: float | Unproven | None) -> bool:
+    return kept.holds is True if isinstance(kept, Unproven) else kept is not None
 
 
 def _the_rest(
