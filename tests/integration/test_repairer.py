@@ -24,9 +24,11 @@ from repair.cycle.scenery import fits
 from repair.cycle.searching import searched
 from repair.deadline import OutOfTime, until
 from repair.errors import ConfigError, ReferenceTrajectoryError, RepairError, ScenarioError
+from repair.scene.frame import FrenetFrame
 from repair.search.result import SearchStatus
 from repair.solvers.registry import make_backend
 
+STRAIGHT = FrenetFrame.from_points([[0.0, 0.0], [100.0, 0.0]])
 DOCS = Path(__file__).parents[2] / "docs" / "planner.md"
 
 
@@ -223,8 +225,26 @@ def test_a_plan_elsewhere_gets_a_frame_of_its_own(scene):
 def test_who_sets_out_across_the_path_gets_a_frame_of_its_own():
     s = 30.0 + np.linspace(0.0, 0.4, 20)
     for slope, along in ((0.0, True), (0.1, True), (0.35, False), (-0.35, False)):
-        assert fits(np.stack([s, slope * (s - 30.0)], axis=1), 100.0, 20.0) is along
-    assert fits(np.full((20, 2), [30.0, 0.1]), 100.0, 20.0)  # who stands sets out nowhere
+        assert fits(np.stack([s, slope * (s - 30.0)], axis=1), STRAIGHT, 20.0, 0.0) is along
+    standing = np.full((20, 2), [30.0, 0.1])  # who stands sets out nowhere, and is where the body is
+    for body, along in ((0.0, True), (0.1, True), (-0.3, False), (3.0, False), (None, True)):
+        assert fits(standing, STRAIGHT, 20.0, body) is along
+
+
+def test_who_stands_turned_is_laid_into_no_path_that_leads_elsewhere(scene):
+    """A plan of three columns that moves by a millimetre, after one whose path lies across."""
+    ego, watch = scene.initial_state, repair.Repairer(scene, backend="ego")
+    t = np.arange(0.0, 3.0 + 1e-9, scene.dt)
+    way, turned = 4.0 * t, ego.orientation + 0.35
+    across = np.column_stack([t, ego.x + way * np.cos(turned), ego.y + way * np.sin(turned)])
+    watch.update(across[:8], traffic=[])
+    crept = np.minimum(0.02 * t, 0.001)
+    still = np.column_stack(
+        [t, ego.x + crept * np.cos(ego.orientation), ego.y + crept * np.sin(ego.orientation)]
+    )
+    cycle = watch.update(still, traffic=[], now=scene.dt)
+    assert (cycle.status, bool(cycle.rebuilt)) == ("no_conflict", True)
+    assert not watch.update(still, traffic=[], now=2.0 * scene.dt).rebuilt
 
 
 def test_without_speeds_the_plan_says_them_by_its_places(scene):

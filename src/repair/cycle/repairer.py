@@ -298,12 +298,11 @@ class Repairer:
         self, scene: Scene, given: GivenReference, rebuilt: list[str]
     ) -> tuple[Scene, GivenReference, Checker | None]:
         """The scene in a frame along the plan: the kept one where the plan is on its path, else a new one."""
-        positions = given.positions
+        positions, body = given.positions, scene.initial_state.orientation
         assert positions is not None
-        kept = self._framed
-        if kept is not None:
+        if (kept := self._framed) is not None:
             places = kept.frame.to_frenet(positions)
-            if fits(places, kept.frame.length, self._room):
+            if fits(places, kept.frame, self._room, None if kept.frame is scene.frame else body):
                 if len(passes(kept.frame)) == 1:  # else where it is there depends on the way
                     given = replace(given, places=(kept.frame, places))
                 return in_frame(kept, scene, places[0], given.heading), given, self._checker
@@ -316,8 +315,7 @@ class Repairer:
                 scene, frame=self.scene.frame, route_lanelets=self.scene.route_lanelets,
                 lane=self.scene.lane, same_direction=self.scene.same_direction, road=self.scene.road,
             )  # fmt: skip
-        if self._lanes is None:
-            self._lanes = lanes_at(scene)
+        self._lanes = self._lanes or lanes_at(scene)
         made = reframe(scene, positions, given.heading, self._lanes)
         self._room = min(_AHEAD, made.frame.length - float(made.frame.to_frenet(positions[-1:])[0, 0]))
         self._framed, self._kept = made, None

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, wrap
 from repair.config.schema import Config
 from repair.errors import ConfigError, ScenarioError, kind_of
 from repair.scene.commonroad import load_scene, scene_from_scenario
+from repair.scene.frame import FrenetFrame
 from repair.scene.scene import InitialState, Scene
 from repair.scene.traffic.given.rows import given_obstacles
 from repair.scene.traffic.obstacle import Obstacle, later
@@ -94,19 +95,26 @@ def scene_now(
     )  # fmt: skip
 
 
-def fits(places: Array, length: float, room: float) -> bool:
+def fits(places: Array, frame: FrenetFrame, room: float, body: float | None) -> bool:
     """Whether a plan is on a frame's path, with as much of it ahead as a new frame would have.
 
     It has to set out along it, too: who crawls would bend within centimetres to get from one to the other.
+    Of a plan that hardly moves the direction says nothing, and the body [rad] has to stand along the path,
+    unless it is None.
     """
+    if not np.isfinite(places).all():
+        return False
     moved = places - places[0]
     begun = moved[np.hypot(*moved.T) >= _SETS_OUT]
+    if len(begun):
+        along = abs(begun[0, 1]) <= _SLOPE * abs(begun[0, 0])
+    else:
+        along = body is None or abs(float(wrap(frame.heading(places[0, 0]) - body))) <= _SLOPE
     return bool(
-        np.isfinite(places).all()
-        and np.abs(places[:, 1]).max() <= _BESIDE
+        np.abs(places[:, 1]).max() <= _BESIDE
         and places[0, 0] > 1.0
-        and places[-1, 0] <= length - room + INSTANT
-        and (not len(begun) or abs(begun[0, 1]) <= _SLOPE * abs(begun[0, 0]))
+        and places[-1, 0] <= frame.length - room + INSTANT
+        and along
     )
 
 
