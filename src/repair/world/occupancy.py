@@ -191,6 +191,7 @@ def _near_by(
     near = np.zeros((len(rows), steps + 2), dtype=np.bool_)
     for shift in (0, 1, 2):
         near[i[close], j[close] + shift] = True
+    near[:, 1:-1] &= np.isfinite(centre)
     nearest = np.full((len(rows), steps), -1)
     nearest[i, j] = place
     for k, one, its in zip(rows, near[:, 1:-1], nearest, strict=True):

@@ -32,6 +32,8 @@ _SLIVER = 1e-5
 # Consecutive poses are put into one box over about this distance [m], and so many at most.
 _BOX = 4.0
 _MOST = 32
+# Up to so many poses are looked at one by one: boxes would cost more than they save.
+_SINGLE = 40
 # The corners of a box with sides (back, right, front, left).
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
@@ -185,17 +187,18 @@ class RoadBoundary:
     def first_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
         """Index of the first pose at which the ego touches or leaves the edge of the road, or None.
 
-        :meth:`surely_inside` settles most poses; asked exactly are the others.
+        :meth:`surely_inside` settles most of many poses; asked exactly are the others.
 
         Parameters
         ----------
         x, y, orientation : (K,) array
             Centre [m] and orientation [rad] of the ego.
         """
-        known = self.surely_inside(x, y, orientation)
-        if known.all():
+        unsure = np.arange(len(x))
+        if len(x) > _SINGLE:
+            unsure = np.flatnonzero(~self.surely_inside(x, y, orientation))
+        if not len(unsure):
             return None
-        unsure = np.flatnonzero(~known)
         inside = self.inside(self.outline(x[unsure], y[unsure], orientation[unsure]))
         return None if inside.all() else int(unsure[np.argmin(inside)])
 
