@@ -115,15 +115,15 @@ def _side(problem: RepairProblem) -> _Way:
 
 
 def _way(problem: RepairProblem) -> _Way:
-    """On which sides a problem's guide passes the obstacles, one after the other."""
+    """On which sides a problem's guide passes the obstacles, one after the other; sideways also when."""
     if problem.passing is None:
         return ()
-    sides = problem.passing.side
+    sides, maneuver = problem.passing.side, problem.passing.maneuver
+    ids = problem.occupancy.ids.tolist()
+    if maneuver in (Maneuver.LEFT, Maneuver.RIGHT):
+        return (maneuver, *ids, sides.tobytes())
     changes = np.diff(sides, axis=1, prepend=-1) != 0
-    return (
-        problem.passing.maneuver, *problem.occupancy.ids.tolist(),
-        *(tuple(row[new].tolist()) for row, new in zip(sides, changes, strict=True)),
-    )  # fmt: skip
+    return (maneuver, *ids, *(tuple(row[new].tolist()) for row, new in zip(sides, changes, strict=True)))
 
 
 def with_margin(probe: Probe, again: Probe, margin: float) -> Probe:
