@@ -115,7 +115,7 @@ def test_no_obstacles_is_no_error():
 def test_who_is_left_out_is_out_of_reach(frame):
     """Behind, too far ahead for the time, or too far aside; everybody else has their usual box."""
     rng = np.random.default_rng(5)
-    steps, start, aside = 12, 30.0, 3.0
+    steps, start, aside = 12, 30.0, (2.0, 4.0)
     ways = 2.0 + 4.0 * np.arange(steps)
     within = Within(start, start - 5.0, start + ways[-1] + 5.0, aside, ways)
     left_out = 0
@@ -132,14 +132,15 @@ def test_who_is_left_out_is_out_of_reach(frame):
             obstacle(rows, turn, "static" if turn % 5 == 0 else "dynamic"),
             rectangles=np.array(rows) * [1.0, 1.0, 1.0, 0.5, 0.5],
         )
-        (whole, _), (part, _) = (build_occupancy([one], frame, 0.1, 2.0, 1.0, w) for w in (None, within))
+        offset = rng.choice([2.0, 9.0])
+        (whole, _), (part, _) = (build_occupancy([one], frame, 0.1, offset, 1.0, w) for w in (None, within))
         known = np.isfinite(part.lower[0, :, 0])
         np.testing.assert_allclose(part.lower[0, known], whole.lower[0, known], atol=1e-8)
         np.testing.assert_allclose(part.upper[0, known], whole.upper[0, known], atol=1e-8)
         left_out += int((~known).sum())
         with np.errstate(invalid="ignore"):
             met = (whole.upper[0, :, 0] > start) & (whole.lower[0, :, 0] < start + ways)
-            met &= (whole.upper[0, :, 1] > -aside) & (whole.lower[0, :, 1] < aside)
+            met &= (whole.upper[0, :, 1] > -aside[0]) & (whole.lower[0, :, 1] < aside[1])
         assert known[met].all()
     assert left_out > 150
 

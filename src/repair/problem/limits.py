@@ -161,6 +161,6 @@ def part_in_reach(
     first, last = s - _SLACK, float(np.fmax(s + ways[-1], end[0, 0])) + _SLACK
     bound = room_of(scene, settings)
     part = slice(*np.searchsorted(bound.s, (first - _SLACK, last + _SLACK)))
-    room = max(float(np.abs(side[part]).max(initial=0.0)) for side in (bound.right, bound.left))
-    more = settings.margin + settings.clearance + max(settings.widen, default=0.0)
-    return Within(s, first, last, room + more + abs(aside) + _BESIDE, ways + _SLACK)
+    more = settings.margin + settings.clearance + max(settings.widen, default=0.0) + abs(aside) + _BESIDE
+    right, left = (float(np.abs(side[part]).max(initial=0.0)) + more for side in (bound.right, bound.left))
+    return Within(s, first, last, (right, left), ways + _SLACK)

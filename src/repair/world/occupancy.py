@@ -47,8 +47,8 @@ class Within(NamedTuple):
         Where it starts, as an arc length [m].
     low, high : float
         The part of the path, likewise.
-    aside : float
-        How far aside of it [m].
+    aside : (float, float)
+        How far to the right and to the left of it [m], both positive.
     ways : (K,) array
         How far from its start by the end of each of the scenario's steps [m]; later it is nowhere.
     """
@@ -56,7 +56,7 @@ class Within(NamedTuple):
     start: float
     low: float
     high: float
-    aside: float
+    aside: tuple[float, float]
     ways: Array
 
 
@@ -94,8 +94,7 @@ def build_occupancy(
     if within is None:
         looked = [_looked_at(k, one) for k, one in enumerate(obstacles)]
     else:
-        reach = within.aside + s_offset + l_offset
-        near, at = _near_by(obstacles, frame, within, reach)
+        near, at = _near_by(obstacles, frame, within, s_offset, l_offset)
         looked = [_looked_at(k, one, near[k], at[k]) for k, one in enumerate(obstacles)]
     looked = [one for one in looked if len(one.steps)]
     lower, upper = np.full((2, len(obstacles), steps, 2), np.nan)
@@ -157,7 +156,7 @@ def _looked_at(
 
 
 def _near_by(
-    obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, reach: float
+    obstacles: Sequence[Obstacle], frame: FrenetFrame, within: Within, s_offset: float, l_offset: float
 ) -> tuple[list[npt.NDArray[np.bool_]], list[npt.NDArray[np.intp]]]:
     """At which steps each obstacle may be near the ego; other shapes than rectangles always are.
 
@@ -173,7 +172,8 @@ def _near_by(
     tables = np.array([obstacles[k].rectangles for k in rows])  # (N, T, 5)
     centre = tables[..., 0] + 1j * tables[..., 1]
     moved = np.nan_to_num(np.abs(np.diff(centre, axis=1))).max(axis=1, initial=0.0)
-    size = np.hypot(tables[..., 3], tables[..., 4]) + moved[:, None]
+    size = np.sqrt(tables[..., 3] ** 2 + tables[..., 4] ** 2) + moved[:, None]  # hypot takes far longer
+    reach = max(within.aside) + s_offset + l_offset
     # How far the ego may be settles most; then, how far aside of the frame it is, and where along it.
     ways = np.full(steps, -np.inf)
     ways[: len(within.ways)] = within.ways[:steps]
@@ -181,13 +181,18 @@ def _near_by(
     middle = np.clip(centre[i, j].view(np.float64).reshape(-1, 2), -_BEYOND, _BEYOND)
     place = frame.nearest(middle)
     s, half = frame.s[place], size[i, j] + frame.s[1]
-    apart = np.hypot(*(middle - frame.points[place]).T)
+    x, y = np.ascontiguousarray((middle - frame.points[place]).T)
+    apart = np.sqrt(x * x + y * y)
     close = (apart <= reach + half) | (place == 0) | (place == len(frame.s) - 1)  # or beyond an end
     if len(passes(frame)) == 1:
         # Along the frame an outline is longer than it is, the more so inside of a bend.
         long = half / (1.0 - _GENTLE)
         told = (long <= _AROUND) & (_bends_around(frame)[place] * (apart + half) <= _GENTLE)
-        close &= ~told | (s + long >= within.low) & (s - long <= within.start + ways[j])
+        along = (s + long + s_offset >= within.low) & (s - long - s_offset <= within.start + ways[j])
+        heading, room = frame.heading_table[place], half + l_offset
+        l = np.cos(heading) * y - np.sin(heading) * x  # noqa: E741
+        right, left = within.aside
+        close &= ~told | along & (l >= -right - room) & (l <= left + room)
     near = np.zeros((len(rows), steps + 2), dtype=np.bool_)
     for shift in (0, 1, 2):
         near[i[close], j[close] + shift] = True
