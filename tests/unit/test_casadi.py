@@ -483,4 +483,7 @@ def test_a_road_that_leaves_room_for_one_value_has_a_status(solver):
     )
     ahead = toy.problem([toy.box((40.0, 50.0), (-2.0, 2.0))], v0=20.0, t_end=5.0, bounds=narrow)
     result = CasadiBackend(CasadiConfig(solver=solver)).solve(problems.guided(ahead, Maneuver.LEFT))
-    assert result.status in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE)
+    # an SQP that does not converge proves nothing
+    none = {"ipopt": SolveStatus.INFEASIBLE, "sqpmethod": SolveStatus.NUMERICAL_ERROR}[solver]
+    assert result.status in (SolveStatus.SOLVED, none)
+    assert (result.curve is None) == (result.status is none)

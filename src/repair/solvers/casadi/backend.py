@@ -318,15 +318,12 @@ class CasadiBackend:
         x0, data = model.unknowns(points), instance.sample_data(points)
         slope = instance.slope if slope is None else slope
         solution = model.solve(x0, data, slope, low, high, deadline)
-        status, word = status_of(model, solution), solution.word
-        unsure = model.structure.solver != "ipopt" and instance.problem.margin >= 0.0
-        if unsure and status not in (SolveStatus.SOLVED, SolveStatus.TIME_LIMIT):
-            # An SQP that does not converge proves nothing; IPOPT has the last word. Where boxes may be
-            # entered another margin may have it: of 134 such problems IPOPT solved none.
-            oracle = build_model(replace(model.structure, solver="ipopt"))
-            solution = oracle.solve(x0, data, slope, low, high, deadline)
-            status, word = status_of(oracle, solution), f"{word}, then IPOPT: {solution.word}"
-        return model.with_unknowns(points, solution.x), status, word, solution.iterations
+        return (
+            model.with_unknowns(points, solution.x),
+            status_of(model, solution),
+            solution.word,
+            solution.iterations,
+        )
 
 
 def _answered(instance: Instance, separation: Separation, points: Array, residuals: dict[str, float]) -> bool:
