@@ -87,12 +87,10 @@ def dead_ends(
             found[near] = road.inside(np.stack([corners.real, corners.imag], axis=2))
         return found
 
-    if corridor is not None:
-        if corridor.clear[0] <= start and start + ahead + _COARSE <= corridor.clear[1]:
-            return []
-        more = _MORE if corridor.clear[0] <= start <= corridor.clear[1] else 0.0  # asked again and again
-    else:
-        more = 0.0
+    since, until = (np.inf, -np.inf) if corridor is None else corridor.clear
+    if since <= start and start + ahead + _COARSE <= until:
+        return []
+    more = _MORE if since <= start <= until else 0.0  # who asks again does so again and again
     low_x, low_y, high_x, high_y = road.region.bounds
     s = start + np.arange(0.0, ahead + more + _COARSE, _COARSE)
     axis = np.zeros(len(s))

@@ -125,7 +125,7 @@ class TrackTable:
         middle = [0.5 * (np.fmin.reduce(v, axis=1) + np.fmax.reduce(v, axis=1)) for v in (x, y)]
         self._block_centre = as_complex(*middle)
         x, y = x - middle[0][:, None], y - middle[1][:, None]
-        away = np.sqrt(x * x + y * y)  # hypot takes ten times as long
+        away = np.sqrt(x * x + y * y)  # hypot takes far longer
         self._block_reach = np.fmax.reduce(away + padded_reach, axis=1) + _SPARE
 
     def near(self, here: Points, start: int, step: float, margin: complex) -> tuple[Index, Index]:
