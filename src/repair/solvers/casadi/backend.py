@@ -43,6 +43,7 @@ from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
 from repair.deadline import OutOfTime, until
 from repair.errors import BackendError
+from repair.problem.lateral import LastPath
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.instance import ROAD_SLACK, Instance, lay_out, overhang_of
 from repair.solvers.casadi.model import TOLERANCE, Model, build_model, status_of
@@ -87,6 +88,7 @@ class CasadiBackend:
         self.config = config or CasadiConfig()
         self.degree = degree
         self.spacing = spacing
+        self._path_of = LastPath()
 
     def solve(
         self, problem: RepairProblem, *, warm_start: Curve | None = None, time_limit: float | None = None
@@ -104,7 +106,7 @@ class CasadiBackend:
         try:
             with until(deadline):
                 model = build_model(self.structure(problem, timed=time_limit is not None))
-                instance, points = lay_out(problem, model)
+                instance, points = lay_out(problem, model, path_of=self._path_of)
                 built, before = time.perf_counter(), model.build_time
                 result = self._rounds(instance, points, warm_start, deadline, time_limit)
                 result = able_to_stop(result, problem, partial(self._bounded, problem, deadline, time_limit))
@@ -156,7 +158,7 @@ class CasadiBackend:
         """As :meth:`_rounds`, with the end within bounds."""
         try:
             model = build_model(self.structure(problem, timed=time_limit is not None, bounded=True))
-            instance, points = lay_out(problem, model, within)
+            instance, points = lay_out(problem, model, within, self._path_of)
             return self._rounds(instance, points, None, deadline, time_limit)
         except OutOfTime as over:  # what was found before stays
             return SolveResult(SolveStatus.TIME_LIMIT, detail=_cut(time_limit, over))

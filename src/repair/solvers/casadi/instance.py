@@ -11,7 +11,7 @@ from repair.curves.base import Curve
 from repair.curves.bspline import greville_offsets
 from repair.curves.fitting import fit_to_curve, splice_points
 from repair.curves.sampled import SampledCurve
-from repair.problem.lateral import kept_path
+from repair.problem.lateral import LastPath, kept_path
 from repair.problem.limits import Limits
 from repair.problem.problem import RepairProblem
 from repair.solvers.casadi.model import Model
@@ -88,13 +88,21 @@ class Instance:
         The given control points, less the origin.
     within : (K,) array, optional
         What the end is bounded by, see :mod:`repair.terminal.room`; goes with ``Structure.ending``.
+    path_of : LastPath, optional
+        Remembers the reference's path from one problem to the next.
     """
 
     def __init__(
-        self, problem: RepairProblem, model: Model, origin: Array, head: Array, within: Array | None = None
+        self,
+        problem: RepairProblem,
+        model: Model,
+        origin: Array,
+        head: Array,
+        within: Array | None = None,
+        path_of: LastPath | None = None,
     ) -> None:
         self.problem, self.model, self.origin, self.head = problem, model, origin, head
-        self.within = within
+        self.within, self._path_of = within, path_of or LastPath()
         self.windows = self._windows()
         self.limits = limit_values(problem.limits)  # by kind of row
         self.relaxed: Array | None = None  # the optimum of the linear rows, once it is known
@@ -135,8 +143,9 @@ class Instance:
         problem, structure = self.problem, self.model.structure
         if problem.lateral:
             return points
-        found = kept_path(problem, points + self.origin, structure.degree, structure.spacing) - self.origin
-        return points if np.array_equal(found[:, 1], points[:, 1]) else found
+        placed = points + self.origin
+        found = kept_path(problem, placed, structure.degree, structure.spacing, self._path_of) - self.origin
+        return points if bool((found[:, 1] == points[:, 1]).all()) else found
 
     def _windows(self) -> Windows:
         """The windows that begin before the end of the repair."""
@@ -292,7 +301,9 @@ class Instance:
         return right, left
 
 
-def lay_out(problem: RepairProblem, model: Model, within: Array | None = None) -> tuple[Instance, Array]:
+def lay_out(
+    problem: RepairProblem, model: Model, within: Array | None = None, path_of: LastPath | None = None
+) -> tuple[Instance, Array]:
     """The instance of a problem, and its initial control points (n, 2) less the origin: the guide's."""
     structure = model.structure
     n, p, h = structure.n, structure.degree, structure.spacing
@@ -306,5 +317,5 @@ def lay_out(problem: RepairProblem, model: Model, within: Array | None = None) -
     points[:p] = head
     if not problem.lateral and problem.passing is not None:
         points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
-    instance = Instance(problem, model, origin, head, within)
+    instance = Instance(problem, model, origin, head, within, path_of)
     return instance, instance.on_path(points)
