@@ -18,7 +18,7 @@ from repair.solvers.casadi.model import Model
 from repair.solvers.casadi.nlp import axis_curvature, body, in_plane
 from repair.solvers.casadi.rows import SAMPLED, Datum, RowKind
 from repair.solvers.casadi.separation import Separation, road_room
-from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
+from repair.solvers.casadi.windows import Boxes, Windows, boxes_in, meeting
 from repair.timegrid import INSTANT
 
 __all__ = [
@@ -317,5 +317,8 @@ def lay_out(
     points[:p] = head
     if not problem.lateral and problem.passing is not None:
         points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
+    path_of = path_of or LastPath()
+    if not problem.lateral:
+        problem = meeting(problem, points[:, 1], path_of(problem.reference, problem.t_rep - p * h), p)
     instance = Instance(problem, model, origin, head, within, path_of)
     return instance, instance.on_path(points)

@@ -27,7 +27,7 @@ from repair.scene.road.bounds import LateralBounds
 from repair.solvers.casadi.windows import Boxes, Windows, boxes_in
 from repair.world.dead_ends import ROAD_END
 
-__all__ = ["NOBODY", "ROAD", "SIDE_OF_BOUND", "Separation", "road_room", "separate"]
+__all__ = ["NOBODY", "ROAD", "SIDE_OF_BOUND", "Separation", "road_room", "separate", "sides_near"]
 
 NOBODY, ROAD = -1, ROAD_END
 #: On which sides of an obstacle the lower and the upper bound of s are, and those of l.
@@ -37,7 +37,7 @@ _SIDES = np.arange(len(Side))
 # clear where it is the larger one. These are its indices, plain integers: the lower bounds of s and l, the
 # upper ones, the sides along and across the path, and each of the latter.
 _LOWER, _UPPER = slice(int(Side.AHEAD), int(Side.LEFT) + 1), slice(int(Side.BEHIND), None, int(Side.RIGHT))
-_ALONG, _ACROSS = slice(None, int(Side.LEFT)), slice(int(Side.LEFT), None)
+_ALONG = slice(None, int(Side.LEFT))
 _LEFT, _RIGHT = int(Side.LEFT), int(Side.RIGHT)
 # A metre along the lane is worth less than one across it when the side of passing is chosen.
 _ROOM_LATERAL = 0.5
@@ -160,13 +160,12 @@ def _claims(
     if deep.any():
         return side, None, f"the ego starts inside obstacle {problem.occupancy.ids[int(deep.argmax())]}", 0.0
     if side is None or room is None:
-        # (N, W, 4); inf where nothing is asked
-        slack = ((shape.swapaxes(0, 1)[..., SIDE_AXIS] * SIDE_SIGN)[:, None] - cover).min(axis=0)
+        slack = _slack(boxes, shape)
     if room is not None:
         # Out of the road's reach: the road's own bounds keep the curve off.
         beside = (boxes.rightmost >= room[1]) | (boxes.leftmost <= room[0])
     else:
-        beside = (slack[..., _ACROSS].max(axis=2)) >= margin - 1e-9
+        beside = np.maximum(slack[..., _LEFT], slack[..., _RIGHT]) >= margin - 1e-9
     if side is None:
         side = _choose(problem, slack - margin, start)
     needed = boxes.asked & ~beside
@@ -203,6 +202,17 @@ def _choose(problem: RepairProblem, slack: Array, start: Array) -> npt.NDArray[n
         score, closed = slack[..., _ALONG].copy(), closed[:, _ALONG]
     score[:, 0][closed] = -np.inf
     return np.asarray(score.argmax(axis=2))
+
+
+def sides_near(problem: RepairProblem, boxes: Boxes, shape: Array) -> npt.NDArray[np.intp]:
+    """The sides (N, W) that :func:`separate` takes near a shape (W, C, 2)."""
+    return _choose(problem, _slack(boxes, shape) - problem.margin, boxes.start)
+
+
+def _slack(boxes: Boxes, shape: Array) -> Array:
+    """What a shape (W, C, 2) has to spare on each side (N, W, 4) [m]; inf where nothing is asked."""
+    place = shape.swapaxes(0, 1)[..., SIDE_AXIS] * SIDE_SIGN
+    return np.asarray((place[:, None] - boxes.cover).min(axis=0))
 
 
 def road_room(

@@ -17,7 +17,7 @@ from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem
 from repair.solvers.casadi.instance import Instance, guide_of, lay_out
 from repair.solvers.casadi.model import Model
 from repair.solvers.casadi.residuals import residuals_of
-from repair.solvers.casadi.separation import SIDE_OF_BOUND, Separation, separate
+from repair.solvers.casadi.separation import SIDE_OF_BOUND, Separation, separate, sides_near
 
 __all__ = ["Opening", "keeping_to", "no_nearer", "open_sides"]
 
@@ -65,7 +65,7 @@ def open_sides(instance: Instance, points: Array) -> Opening:
     repair.deadline.OutOfTime
         If the deadline passes before.
     """
-    model, problem, windows = instance.model, instance.problem, instance.windows
+    model, problem, windows, boxes = instance.model, instance.problem, instance.windows, instance.boxes
     slope = instance.slope
     moment = windows.moment
     shape = guide_of(problem).sample(moment.ravel()).position.reshape(*moment.shape, 2)
@@ -76,13 +76,13 @@ def open_sides(instance: Instance, points: Array) -> Opening:
     closest: tuple[Array, dict[str, float]] | None = None
     for _ in range(_SIDES):
         in_time()
-        separation = separate(problem, windows, len(model.obstacle), shape, room, boxes=instance.boxes)
+        side = None if before is None or boxes is None else sides_near(problem, boxes, shape)
+        if side is not None and np.array_equal(side, before):
+            break
+        separation = separate(problem, windows, len(model.obstacle), shape, room, side, boxes)
         if separation.why:
             return Opening(separation, points, separation.why, closest)
-        side = separation.side
-        if before is not None and side is not None and np.array_equal(side, before):
-            break
-        before = side
+        before = separation.side
         gap = _gap_in(separation)
         why = why or gap
         low, high = instance.bounds(separation, None)

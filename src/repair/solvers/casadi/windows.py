@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array
+from repair.arrays import Array, largest, smallest
+from repair.problem.lateral import Path
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 from repair.timegrid import INSTANT, STEP
 
-__all__ = ["Boxes", "Windows", "boxes_in"]
+__all__ = ["Boxes", "Windows", "boxes_in", "meeting"]
+
+_BESIDE = 0.5  # [m] besides the margin; lines that cover an edge may bulge by less
 
 # Plain integers, as indices of what has one entry for each side.
 _BEHIND, _AHEAD, _LEFT, _RIGHT = (int(s) for s in (Side.BEHIND, Side.AHEAD, Side.LEFT, Side.RIGHT))
@@ -66,6 +69,32 @@ class Boxes:
     start: Array
     rightmost: Array
     leftmost: Array
+
+
+def meeting(problem: RepairProblem, aside: Array, path: Path | None, degree: int) -> RepairProblem:
+    """The problem of who keeps to the reference's path, with the obstacles alone that this path may meet.
+
+    Those that are beside it at all times ask for nothing, whatever the curve.
+
+    Parameters
+    ----------
+    aside : (n,) array
+        l of the control points to begin with [m].
+    path : Path or None
+        The reference's; None where no curve leaves these l.
+    degree : int
+    """
+    right, left = smallest(aside), largest(aside)
+    if path is not None:
+        # What kept_path takes off is a share of how much its slope changes, twice the range at most.
+        lowest, highest = smallest(path.l), largest(path.l)
+        over = (degree + 1) / 12.0 * (highest - lowest)
+        right, left = min(right, lowest - over), max(left, highest + over)
+    boxes, reach = problem.occupancy, problem.margin + _BESIDE
+    steps = slice(max(int(boxes.t.searchsorted(problem.t_rep)) - 1, 0), None)
+    there = (boxes.lower[:, steps, 1] < left + reach) & (boxes.upper[:, steps, 1] > right - reach)
+    rows = np.logical_or.reduce(there, axis=1).nonzero()[0]
+    return problem if len(rows) == len(boxes) else replace(problem, occupancy=boxes.select(rows))
 
 
 def _knots(problem: RepairProblem, windows: Windows, width: float) -> Array:
