@@ -6,11 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests import roads
+from tests import roads, toy
 
 import repair
+from repair.curves.bspline import UniformBSpline
 from repair.preparation import among
 from repair.problem.lateral import LastPath, aside_at, kept_path, path_of
+from repair.solvers.casadi.backend import CasadiBackend
+from repair.solvers.casadi.instance import lay_out
+from repair.solvers.casadi.model import build_model
+from repair.solvers.casadi.separation import separate
 
 
 @pytest.fixture(scope="module")
@@ -99,3 +104,32 @@ def test_a_plan_that_is_projected_already_is_the_same_reference(scene):
     np.testing.assert_array_equal(made.points, fresh.points)
     elsewhere = replace(given, places=(None, given.places[1] + 5.0))  # of another frame
     np.testing.assert_array_equal(elsewhere.curve(prepared.scene).points, fresh.points)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_who_keeps_the_path_leaves_out_whom_it_never_meets(monkeypatch, seed):
+    rng = np.random.default_rng(seed)
+    s = np.arange(40) * 2.0 * (1.0 - 0.01 * np.arange(40))
+    reference = UniformBSpline(0.0, 0.2, 3, np.column_stack([s, 0.6 * np.sin(s / rng.uniform(3.0, 9.0))]))
+    boxes = [
+        toy.box((a, a + 5.0), (b, b + 2.0), rng.uniform(-2.0, 2.0, 2), sorted(rng.uniform(-2.0, 6.0, 2)))
+        for a, b in rng.uniform((12.0, -9.0), (50.0, 7.0), (12, 2))
+    ] + [toy.box((30.0, 35.0), (-1.0, 1.0))]
+    problem = toy.problem(boxes, t_rep=0.4, t_end=4.4, reference=reference, lateral=False)
+    model = build_model(CasadiBackend().structure(problem))
+    near, points = lay_out(problem, model)
+    monkeypatch.setattr("repair.solvers.casadi.instance.meeting", lambda problem, *_: problem)
+    every, _ = lay_out(problem, model)
+    assert len(near.problem.occupancy) < len(every.problem.occupancy) == len(boxes)
+    for share in (1.0, 0.6, 0.2):  # whatever the speed
+        slower = points.copy()
+        slower[3:, 0] = points[2, 0] + share * (points[3:, 0] - points[2, 0])
+        shape = every.shape(every.on_path(slower))
+        found, same = (
+            separate(one.problem, one.windows, len(model.obstacle), shape, None, boxes=one.boxes)
+            for one in (near, every)
+        )
+        assert found.why or np.isfinite((found.lower, found.upper)).any()
+        assert found.why == same.why
+        assert np.array_equal(found.lower, same.lower)
+        assert np.array_equal(found.upper, same.upper)
