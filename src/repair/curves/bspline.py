@@ -57,11 +57,12 @@ def _sparse(weights: Array, columns: npt.NDArray[np.intp], n: int) -> Any:
     return csr_array((weights.T.ravel(), columns, rows), shape=(count, n))
 
 
-@lru_cache(maxsize=64)
 def sampling_at(
     times: bytes, t_start: float, n: int, degree: int, spacing: float, *, dense: int = DENSE
 ) -> Any:
     """The matrix of a spline's samples for :func:`repair.curves.sampling.evaluated`.
+
+    Searches, and a planner's cycles, ask for the same times over and over: it is kept, unless it is huge.
 
     It is sparse where it is large: any time sees p + 1 control points only.
 
@@ -77,9 +78,23 @@ def sampling_at(
     dense : int
         Times * points up to which the matrix is a dense one.
     """
+    count = len(times) // 8
+    if count * n <= dense:
+        return _dense_at(times, t_start, n, degree, spacing)
+    made = _sparse_at if count <= KEPT else _sparse_at.__wrapped__
+    return made(times, t_start, n, degree, spacing)
+
+
+# A planner's cycle asks for some twenty, mostly others than the one before; each takes 100 kB at most.
+@lru_cache(maxsize=256)
+def _dense_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
     t_end = t_start + (n - degree) * spacing
-    if len(times) // 8 * n <= dense:
-        return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
+    return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
+
+
+@lru_cache(maxsize=64)
+def _sparse_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Any:
+    t_end = t_start + (n - degree) * spacing
     found: list[_Alive] = []
 
     def alive(offsets: bytes) -> Array:
@@ -156,9 +171,7 @@ class UniformBSpline:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Position and three derivatives at the times ``t`` [s]; beyond the span the end speed is held."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # Probes ask for the same times over and over; the matrices are worth keeping, unless they are huge.
-        made = sampling_at if len(times) <= KEPT else sampling_at.__wrapped__
-        matrix = made(
+        matrix = sampling_at(
             times.tobytes(), float(self.t_start), len(self.points), self.degree, float(self.spacing)
         )
         position, velocity, acceleration, jerk = evaluated(matrix, self.points)
