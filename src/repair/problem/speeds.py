@@ -76,38 +76,69 @@ class Rollouts(NamedTuple):
         return self.s[:, p], v, rate * (self.family.begun[:, p] < self.change[p])
 
 
+class _Pattern(NamedTuple):
+    """What they have in common whatever the acceleration limits, which may be others in each cycle."""
+
+    braking: Array  # (P,), the shares of the smallest and of the largest acceleration that make the rate
+    throttle: Array
+    share: Array
+    gain: Array
+    since: Array  # (K, P), as in _Family
+    begun: Array
+    shown: npt.NDArray[np.bool_]  # (P,), the change begins on a sample
+    slowest: int
+    fastest: int
+
+
 @lru_cache(maxsize=64)
-def _family(a_min: float, a_max: float, a_total: float, count: int, step: float) -> _Family:
+def _pattern(count: int, step: float) -> _Pattern:
     """All profiles over ``count`` samples, ``step`` apart."""
     tau = step * np.arange(count)
-    family = [(0.0, 1.0, 1.0, 0.0)]  # to the speed that it has: no change
-    family += [(0.0, share * a_min, hold, 0.0) for share in _BRAKING for hold in _HOLD]
+    family = [(0.0, 0.0, 0.0, 1.0, 0.0)]  # to the speed that it has: no change
+    family += [(0.0, share, 0.0, hold, 0.0) for share in _BRAKING for hold in _HOLD]
     family += [
-        (delay, share * a_max, 1.0, gain)
+        (delay, 0.0, share, 1.0, gain)
         for share in _THROTTLE
         for gain in _GAINS
         for delay in _DELAYS
         if delay < tau[-1]
     ]
-    hardest = (0.0, _THROTTLE[-1] * a_max, 1.0, _GAINS[-1])
-    delay, rate, share, gain = (frozen(column) for column in np.array(family).T)
+    hardest = (0.0, 0.0, _THROTTLE[-1], 1.0, _GAINS[-1])
+    delay, braking, throttle, share, gain = (frozen(column) for column in np.array(family).T)
     since = tau[:, None] - delay
-    # Who begins on a sample shows the acceleration there, or else changes nothing.
-    harsh = (np.abs(rate) > _GUIDED * a_total) & (since == 0.0).any(axis=0)
-    harsh[0] = False  # who holds the speed has a rate in name only
-    harsh.setflags(write=False)
-    return _Family(
-        rate,
+    shown = (since == 0.0).any(axis=0)
+    shown[0] = False  # who holds the speed has a rate in name only
+    shown.setflags(write=False)
+    return _Pattern(
+        braking,
+        throttle,
         share,
         gain,
-        weight=frozen(rate**2 / count),
-        half=frozen(0.5 * rate * np.ones_like(since)),
         since=frozen(np.maximum(since, 0.0)),
         begun=frozen(np.where(since >= 0.0, since, np.inf)),
-        harsh=harsh,
-        slowest=family.index((0.0, _BRAKING[-1] * a_min, _HOLD[0], 0.0)),
+        shown=shown,
+        slowest=family.index((0.0, _BRAKING[-1], 0.0, _HOLD[0], 0.0)),
         fastest=family.index(hardest) if hardest in family else 0,
     )
+
+
+@lru_cache(maxsize=64)
+def _family(a_min: float, a_max: float, a_total: float, count: int, step: float) -> _Family:
+    """All profiles over ``count`` samples, ``step`` apart, within some acceleration limits."""
+    pattern = _pattern(count, step)
+    rate = pattern.braking * a_min + pattern.throttle * a_max
+    rate[0] = 1.0
+    # Who begins on a sample shows the acceleration there, or else changes nothing.
+    harsh = (np.abs(rate) > _GUIDED * a_total) & pattern.shown
+    half = np.empty_like(pattern.since)
+    half[:] = 0.5 * rate
+    weight = rate**2 / count
+    for made in (rate, weight, half, harsh):
+        made.setflags(write=False)
+    return _Family(
+        rate, pattern.share, pattern.gain, weight, half, pattern.since, pattern.begun, harsh,
+        pattern.slowest, pattern.fastest,
+    )  # fmt: skip
 
 
 def speed_profiles(start: Array, tau: Array, limits: Limits) -> Rollouts:
