@@ -74,7 +74,7 @@ class Boxes:
 def meeting(problem: RepairProblem, aside: Array, path: Path | None, degree: int) -> RepairProblem:
     """The problem of who keeps to the reference's path, with the obstacles alone that this path may meet.
 
-    Those that are beside it at all times ask for nothing, whatever the curve.
+    Those that are on one side of it at all times ask for nothing, whatever the curve.
 
     Parameters
     ----------
@@ -92,8 +92,9 @@ def meeting(problem: RepairProblem, aside: Array, path: Path | None, degree: int
         right, left = min(right, lowest - over), max(left, highest + over)
     boxes, reach = problem.occupancy, problem.margin + _BESIDE
     steps = slice(max(int(boxes.t.searchsorted(problem.t_rep)) - 1, 0), None)
-    there = (boxes.lower[:, steps, 1] < left + reach) & (boxes.upper[:, steps, 1] > right - reach)
-    rows = np.logical_or.reduce(there, axis=1).nonzero()[0]
+    # Who is on one side at a step and on the other at the next has crossed it in between.
+    lower, upper = boxes.lower[:, steps, 1] < left + reach, boxes.upper[:, steps, 1] > right - reach
+    rows = (np.logical_or.reduce(lower, axis=1) & np.logical_or.reduce(upper, axis=1)).nonzero()[0]
     return problem if len(rows) == len(boxes) else replace(problem, occupancy=boxes.select(rows))
 
 
