@@ -23,3 +23,13 @@ def test_the_miss_is_one_of_the_margin_also_for_who_starts_nearer(start, slower)
     nearest = (start + (10.0 - slower) * t - found.closest.curve.sample(t).position[:, 0]).min()
     assert nearest >= problem.margin - found.closest.miss - 1e-6
     assert nearest <= problem.margin - found.closest.miss + problem.margin  # and says no more than that
+
+
+def test_what_is_nearest_to_a_verified_curve_is_looked_for_beside_others():
+    boxes = [toy.box((45.0, 55.0), (-1.0, 1.0)), toy.box((10.0, 15.0), (4.0, 6.0))]
+    backend = CasadiBackend(CasadiConfig(solver="sqpmethod"))
+    problem = problems.forced(toy.problem(boxes, lateral=False))
+    first = backend.solve(problem).curve
+    nearest = backend.solve(problem, warm_start=first).closest
+    assert nearest.miss == pytest.approx(0.0, abs=1e-9)
+    assert nearest.curve.points == pytest.approx(first.points, abs=0.01)

@@ -302,9 +302,18 @@ class Instance:
 
 
 def lay_out(
-    problem: RepairProblem, model: Model, within: Array | None = None, path_of: LastPath | None = None
+    problem: RepairProblem,
+    model: Model,
+    within: Array | None = None,
+    path_of: LastPath | None = None,
+    *,
+    aside: bool = False,
 ) -> tuple[Instance, Array]:
-    """The instance of a problem, and its initial control points (n, 2) less the origin: the guide's."""
+    """The instance of a problem, and its initial control points (n, 2) less the origin: the guide's.
+
+    Who keeps the reference's path leaves out the obstacles that are beside it, unless its curve may be
+    ``aside`` of that.
+    """
     structure = model.structure
     n, p, h = structure.n, structure.degree, structure.spacing
     origin = np.array([problem.start[0, 0], 0.0])
@@ -318,7 +327,7 @@ def lay_out(
     if not problem.lateral and problem.passing is not None:
         points[p:, 1] = fit_to_curve(problem.reference, problem.t_rep, n, p, h).points[p:, 1]
     path_of = path_of or LastPath()
-    if not problem.lateral:
+    if not problem.lateral and not aside:
         problem = meeting(problem, points[:, 1], path_of(problem.reference, problem.t_rep - p * h), p)
     instance = Instance(problem, model, origin, head, within, path_of)
     return instance, instance.on_path(points)

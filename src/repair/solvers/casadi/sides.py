@@ -151,7 +151,7 @@ def _around(
     problem: RepairProblem, model: Model, curve: Curve, side: npt.NDArray[np.intp] | None = None
 ) -> tuple[Instance, Separation, Array]:
     n, p, h = model.structure.n, model.structure.degree, model.structure.spacing
-    instance, points = lay_out(problem, model)
+    instance, points = lay_out(problem, model, aside=True)
     fit = fit_to_curve(curve, problem.t_rep, n, p, h)
     if isinstance(curve, UniformBSpline) and (len(curve.points), curve.degree, curve.spacing) == (n, p, h):
         fit = curve
