@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests import toy
@@ -26,10 +28,10 @@ def test_the_miss_is_one_of_the_margin_also_for_who_starts_nearer(start, slower)
 
 
 def test_what_is_nearest_to_a_verified_curve_is_looked_for_beside_others():
-    boxes = [toy.box((45.0, 55.0), (-1.0, 1.0)), toy.box((10.0, 15.0), (4.0, 6.0))]
+    boxes = [toy.box((30.0, 40.0), (-1.0, 1.0)), toy.box((10.0, 15.0), (0.45, 2.5))]
     backend = CasadiBackend(CasadiConfig(solver="sqpmethod"))
     problem = problems.forced(toy.problem(boxes, lateral=False))
-    first = backend.solve(problem).curve
-    nearest = backend.solve(problem, warm_start=first).closest
-    assert nearest.miss == pytest.approx(0.0, abs=1e-9)
-    assert nearest.curve.points == pytest.approx(first.points, abs=0.01)
+    nearer = backend.solve(replace(problem, margin=problem.margin - 0.3)).curve
+    nearest = backend.solve(problem, warm_start=nearer).closest
+    assert nearest.miss == pytest.approx(0.3, abs=0.01)
+    assert nearest.curve.points == pytest.approx(nearer.points, abs=0.05)
