@@ -23,7 +23,7 @@ from repair.preparation import Phases, Prepared, among, prepare
 from repair.scene.commonroad import load_scene, with_traffic
 from repair.scene.scene import Scene
 from repair.search.modes import ModeResult, each_mode
-from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.result import Like, Probe, SearchResult, SearchStatus
 from repair.search.several import capabilities_of, search_with
 from repair.solvers.registry import make_backend
 from repair.vehicle.commonroad_ks import load_official
@@ -169,7 +169,7 @@ def find(
     on_probe: Callable[[Probe], None] | None = None,
     settings: SearchConfig | None = None,
     visits: Sequence[float] | None = None,
-    like: Probe | None = None,
+    like: Like | None = None,
 ) -> SearchResult:
     """The search alone, as the configuration (or other ``settings`` of the search) describes it.
 
@@ -179,7 +179,7 @@ def find(
         Where the TTR is kept that ``driver: at_ttr`` needs.
     visits : sequence of float, optional
         The times-to-repair to try [s], instead of those of the search's rule.
-    like : Probe, optional
+    like : Like, optional
         What passed in a search that is much like this one; see :func:`repair.search.search.search_f_ttr`.
 
     Raises

@@ -14,7 +14,7 @@ from repair.curves.bernstein import BernsteinCurve
 from repair.curves.bspline import UniformBSpline
 from repair.preparation import Prepared
 from repair.scene.frame import FrenetFrame
-from repair.search.result import Probe, SearchResult
+from repair.search.result import Like, Probe, SearchResult
 from repair.timegrid import INSTANT, on_grid
 
 __all__ = ["KeptRepair", "Later", "hints", "verified_again"]
@@ -100,9 +100,7 @@ class KeptRepair:
         return replace(self, failed=min(at for at in (*failed, math.inf) if at > own) - self.now)
 
 
-def hints(
-    last: KeptRepair | None, now: float, step: float
-) -> tuple[float | None, tuple[Probe, float] | None]:
+def hints(last: KeptRepair | None, now: float, step: float) -> tuple[float | None, Like | None]:
     """Where a search begins that follows another one, and what is asked there first.
 
     Parameters
@@ -117,14 +115,14 @@ def hints(
     -------
     guess : float or None
         In the middle between what was feasible and what was not [s]; None where all of that is past.
-    like : (Probe, float) or None
-        What passed, and before when [s] that is likely.
+    like : Like or None
+        What passed.
     """
     if last is None:
         return None, None
     late = min(last.failed, last.f_ttr + step) - (now - last.now)
     due = last.due(now)
-    return None if due < 0.0 else 0.5 * (due + late), None if last.probe is None else (last.probe, late)
+    return None if due < 0.0 else 0.5 * (due + late), None if last.probe is None else Like(last.probe, late)
 
 
 def verified_again(kept: KeptRepair, prepared: Prepared, now: float) -> tuple[float, Curve] | None:

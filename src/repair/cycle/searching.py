@@ -11,7 +11,7 @@ import numpy as np
 from repair.api import find
 from repair.backend.base import RepairBackend
 from repair.preparation import Prepared
-from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.result import Like, Probe, SearchResult, SearchStatus
 from repair.search.rules import CONTIGUOUS, around
 from repair.search.settings import SearchConfig
 from repair.timegrid import INSTANT, intervals
@@ -54,7 +54,7 @@ def searched(
     above: float | None = None,
     stride: float | None = None,
     on_probe: Callable[[Probe], None] | None = None,
-    like: tuple[Probe, float] | None = None,
+    like: Like | None = None,
 ) -> SearchResult:
     """The F-TTR of a cycle.
 
@@ -78,8 +78,8 @@ def searched(
         How much farther such a rule looks after ``guess`` [s], by default by one step of the grid.
     on_probe : callable, optional
         Called after every probe; one that raises :class:`repair.deadline.OutOfTime` ends the search.
-    like : (Probe, float), optional
-        What passed a cycle ago, and before when [s] its side is asked first, as tight as it had to be.
+    like : Like, optional
+        What passed a cycle ago: its side is asked first, as tight as it had to be.
     """
     begin = time.perf_counter()
     found = _searched(prepared, backend, settings, kept, guess, above, stride, on_probe, like)
@@ -98,7 +98,7 @@ def _searched(
     above: float | None,
     stride: float | None,
     on_probe: Callable[[Probe], None] | None,
-    like: tuple[Probe, float] | None,
+    like: Like | None,
 ) -> SearchResult:
     """From the last cycle's answer on, by a rule that takes feasibility to be contiguous; else by its own."""
     end = _end(prepared, settings)
@@ -120,8 +120,7 @@ def _searched(
     complete, k = True, next(order, None)
     while k is not None and complete:
         left = _left(settings, begin)
-        alike = like[0] if like is not None and k * step < like[1] - INSTANT else None
-        found = find(prepared, backend, settings=left, visits=(k * step,), on_probe=on_probe, like=alike)
+        found = find(prepared, backend, settings=left, visits=(k * step,), on_probe=on_probe, like=like)
         probes += found.probes
         complete = found.complete
         try:

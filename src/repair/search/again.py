@@ -28,6 +28,11 @@ class Notches(NamedTuple):
     edge: int = 0
     ease: int = 0
 
+    @classmethod
+    def of(cls, amounts: Sequence[float], lists: Sequence[Sequence[float]]) -> Notches:
+        """As many as some amounts hold."""
+        return cls(*(sum(k <= a for k in notches) for a, notches in zip(amounts, lists, strict=True)))
+
     def after(self, verdict: Verdict) -> Notches:
         """One notch more of whatever the verdict misses."""
         missed = {violation.reason for violation in verdict.violations}
@@ -73,7 +78,7 @@ def probe_again(
     """
     tried = list(probe.tried)
     for problem, first in rejected:
-        verdict, taken = first.verdict, Notches()
+        verdict, taken = first.verdict, Notches.of(first.tightened, source.notches)
         while not verdict.ok:
             further = taken.after(verdict)
             amounts = further.amounts(source.notches)

@@ -14,7 +14,7 @@ from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
 from repair.problem.problem import Maneuver, RepairProblem
 from repair.problem.taken import taken
-from repair.search.result import Probe
+from repair.search.result import Like, Probe
 
 __all__ = [
     "Budget",
@@ -99,7 +99,7 @@ class Budget:
     # whether the reference meets an obstacle
     collides: bool = False
     # what passed in an earlier search that is much like this one: its side is asked first, as tight
-    like: Probe | None = None
+    like: Like | None = None
 
     @property
     def left(self) -> float | None:
@@ -125,8 +125,11 @@ def probe_sides(
     sides: str,
     warm_start: Curve | None,
     budget: Budget,
+    failed: tuple[RepairProblem, Probe] | None = None,
 ) -> tuple[Probe, Rejected]:
     """Solve and check every open side; keep the feasible one of least cost, else the first failure.
+
+    A side that is known to have ``failed`` is not asked.
 
     Returns
     -------
@@ -141,8 +144,11 @@ def probe_sides(
         if tried and budget.spent:
             budget.cut = True
             break
-        probe = probe_one(t_rep, problem, backend, checker, warm_start, budget)
-        tried.append(words(probe))
+        if failed is not None and problem is failed[0]:
+            probe = failed[1]
+        else:
+            probe = probe_one(t_rep, problem, backend, checker, warm_start, budget)
+        tried.append(words(probe, probe.tightened))
         if not probe.feasible:
             rejected.append((problem, probe))
         if best is None or better(probe, best):

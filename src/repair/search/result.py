@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from repair.backend.base import SolveResult
 from repair.check.verdict import Conflict, Verdict
 from repair.curves.base import Curve
 from repair.problem.problem import Maneuver
 
-__all__ = ["Probe", "SearchResult", "SearchStatus"]
+__all__ = ["Like", "Probe", "SearchResult", "SearchStatus"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,20 @@ class Probe:
     def feasible(self) -> bool:
         """Whether the repaired trajectory passed every check."""
         return self.solve.curve is not None and self.verdict.ok
+
+
+class Like(NamedTuple):
+    """What passed in a search that is much like another one.
+
+    Attributes
+    ----------
+    probe : Probe
+    until : float
+        Before when [s] it is likely to pass there, too; from then on it is not.
+    """
+
+    probe: Probe
+    until: float = math.inf
 
 
 class SearchStatus(str, Enum):

@@ -25,7 +25,7 @@ from repair.search.probe import (
     better,
     probe_sides,
 )
-from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.result import Like, Probe, SearchResult, SearchStatus
 from repair.search.rules import CONTIGUOUS, IsOpen, Order, from_the_end, probe_order
 from repair.search.settings import SearchConfig
 from repair.search.visit import visit
@@ -162,7 +162,7 @@ def search_f_ttr(
     on_probe: Callable[[Probe], None] | None = None,
     after: Probe | None = None,
     hopeless: Hopeless | None = None,
-    like: Probe | None = None,
+    like: Like | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> SearchResult:
     """Algorithm 1 of the paper.
@@ -185,7 +185,7 @@ def search_f_ttr(
         A feasible one: only later t_rep are visited, and its curve is where to start from.
     hopeless : Hopeless, optional
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
-    like : Probe, optional
+    like : Like, optional
         What passed in a search that is much like this one: where it had to be tightened, its side is asked
         first, as tight.
     clock : callable

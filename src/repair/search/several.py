@@ -17,7 +17,7 @@ from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
 from repair.problem.problem import RepairProblem
 from repair.search.probe import Hopeless, ProblemSource
-from repair.search.result import Probe, SearchResult, SearchStatus
+from repair.search.result import Like, Probe, SearchResult, SearchStatus
 from repair.search.rules import CONTIGUOUS
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
@@ -40,7 +40,7 @@ def search_with(
     too_late: Callable[[], float] | None = None,
     hopeless: Hopeless | None = None,
     on_probe: Callable[[Probe], None] | None = None,
-    like: Probe | None = None,
+    like: Like | None = None,
 ) -> SearchResult:
     """Algorithm 1 with a backend, or with each member of one that is made of several.
 
@@ -66,7 +66,7 @@ def search_with(
         Says of a t_rep whether it is proven that nothing is feasible there (``search.proofs``).
     on_probe : callable, optional
         Called after every probe.
-    like : Probe, optional
+    like : Like, optional
         What passed in a search that is much like this one; see :func:`repair.search.search.search_f_ttr`.
 
     Raises
@@ -176,7 +176,7 @@ def _search_with(
     too_late: Callable[[], float] | None,
     hopeless: Hopeless | None,
     on_probe: Callable[[Probe], None] | None,
-    like: Probe | None,
+    like: Like | None,
 ) -> SearchResult:
     """As :func:`search_with`, without fallbacks."""
 
@@ -187,7 +187,7 @@ def _search_with(
             around or own, situation.conflict, _Unaided(one, name, refused, onward=after), situation.judge,
             settings, visits=visits, on_probe=on_probe if several is None else by(name), after=best,
             hopeless=hopeless if not after or _slow(one.capabilities, refused) else None,
-            like=like if like is not None and like.by in ("", name) else None,
+            like=like if like is not None and like.probe.by in ("", name) else None,
         )  # fmt: skip
 
     def by(name: str) -> Callable[[Probe], None]:

@@ -20,7 +20,8 @@ from repair.search.probe import (
     probe_sides,
     words,
 )
-from repair.search.result import Probe
+from repair.search.result import Like, Probe
+from repair.timegrid import INSTANT
 
 __all__ = ["visit"]
 
@@ -37,24 +38,30 @@ def visit(
     warm_start: Curve | None,
     budget: Budget,
     at_first: str = "",
-    like: Probe | None = None,
+    like: Like | None = None,
 ) -> Probe:
     """One t_rep, with its first problems and then with other margins.
 
     ``at_first`` is what counts instead of ``sides`` for the first problems. Where ``like`` had to be
-    tightened to pass, its side is asked before them, as tight.
+    tightened to pass, its side is asked before them, as tight; and not with less room where it is unlikely
+    to pass and that came too close.
     """
     budget.cut = False
 
     def one(problem: RepairProblem, amounts: tuple[float, ...]) -> Probe:
         return probe_one(t_rep, problem.tightened(*amounts), backend, checker, warm_start, budget)
 
-    side = _side_of(like, first)
-    tight = () if like is None or side is None else like.tightened
-    known = one(side, tight) if side is not None else None
+    side = None if like is None else _side_of(like.probe, first)
+    tight = () if like is None or side is None else like.probe.tightened
+    known = replace(one(side, tight), tightened=tight) if side is not None else None
     if known is not None and known.feasible:
-        return replace(known, tried=(words(known, tight),), tightened=tight)
-    probe, rejected = probe_sides(t_rep, first, backend, checker, at_first or sides, warm_start, budget)
+        return replace(known, tried=(words(known, tight),))
+    failed = None
+    if like and side and known and t_rep > like.until - INSTANT and too_close(known.verdict):
+        failed = (side, known)
+    probe, rejected = probe_sides(
+        t_rep, first, backend, checker, at_first or sides, warm_start, budget, failed
+    )  # fmt: skip
     if probe.feasible:
         return probe
     helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
@@ -98,9 +105,9 @@ def visit(
     return probe
 
 
-def _side_of(like: Probe | None, first: Sequence[RepairProblem]) -> RepairProblem | None:
+def _side_of(like: Probe, first: Sequence[RepairProblem]) -> RepairProblem | None:
     """The side that passed before as tightened; None where none did, or as it was."""
-    if like is None or not any(like.tightened):
+    if not any(like.tightened):
         return None
     return next((p for p in first if p.passing is None or p.passing.maneuver is like.maneuver), None)
 
