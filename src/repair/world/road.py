@@ -9,7 +9,7 @@ from __future__ import annotations
 from copy import copy
 from functools import cached_property, lru_cache
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,22 +38,15 @@ _SINGLE = 40
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
 
-class _Gaps(NamedTuple):
-    """What is road and in no section: prepared for questions, and the boxes (N, 4) around its parts."""
+def _meet(region: Any, polygons: npt.NDArray[np.object_]) -> npt.NDArray[np.bool_]:
+    """Which polygons meet a prepared region: safe among threads."""
+    import shapely
 
-    region: Any
-    boxes: Array
-
-    def close(self, x: Array, y: Array, radius: float) -> npt.NDArray[np.intp]:
-        """Which of circles around places (K,) reach one of the boxes."""
-        low, high = self.boxes[:, :2] - radius, self.boxes[:, 2:] + radius
-        some = (low <= (x.max(), y.max())).all(axis=1) & (high >= (x.min(), y.min())).all(axis=1)
-        (left, below), (right, above) = low[some].T, high[some].T
-        x, y = x[:, None], y[:, None]
-        return np.flatnonzero(((left <= x) & (x <= right) & (below <= y) & (y <= above)).any(axis=1))
+    with _PREPARED:
+        return np.asarray(shapely.intersects(region, polygons))
 
 
-def _beyond(region: Any, sections: Any) -> _Gaps | None:
+def _beyond(region: Any, sections: Any) -> Any:
     """What of a region is in no section; None where that is rounding."""
     import shapely
 
@@ -63,7 +56,7 @@ def _beyond(region: Any, sections: Any) -> _Gaps | None:
         return None
     gaps = shapely.union_all(parts)
     shapely.prepare(gaps)
-    return _Gaps(gaps, shapely.bounds(parts))
+    return gaps
 
 
 class RoadBoundary:
@@ -96,7 +89,7 @@ class RoadBoundary:
         import shapely
 
         self._scenario = scenario
-        self._corners, self._radius = vehicle.corners, 1.001 * vehicle.radius
+        self._corners = vehicle.corners
         self.region = shapely.union_all(outlines(scenario.lanelet_network))
         self._drawn = self.region
         if gap > 0.0:
@@ -116,16 +109,20 @@ class RoadBoundary:
             Its index, where and how much of it in words, and the place [m].
         """
         gaps = self._gaps
-        close = np.empty(0, dtype=np.intp) if gaps is None or not len(x) else gaps.close(x, y, self._radius)
-        if gaps is None or not len(close):
+        if gaps is None or not len(x):
             return None
         import shapely
 
+        pose, boxes = self._around(x, y, orientation)
+        close = np.arange(len(x))
+        if len(boxes):
+            close = np.unique(pose[:, _meet(gaps, shapely.polygons(boxes))])
+        if not len(close):
+            return None
         bodies = shapely.polygons(self.outline(x[close], y[close], orientation[close]))
-        with _PREPARED:
-            near = np.flatnonzero(shapely.intersects(gaps.region, bodies))
+        near = _meet(gaps, bodies)
         for index, body in zip(close[near].tolist(), bodies[near], strict=True):
-            part = shapely.intersection(body, gaps.region)
+            part = shapely.intersection(body, gaps)
             if (area := float(shapely.area(part))) > _SLIVER:
                 at = shapely.centroid(part)
                 words = (
@@ -137,7 +134,7 @@ class RoadBoundary:
         return None
 
     @cached_property
-    def _gaps(self) -> _Gaps | None:
+    def _gaps(self) -> Any:
         """What is road here and none for the drivability checker, which has the sections alone; or None."""
         import shapely
 
@@ -149,7 +146,7 @@ class RoadBoundary:
         import shapely
 
         wider, gaps = copy(self), self._gaps
-        sections = self.region if gaps is None else shapely.difference(self.region, gaps.region)
+        sections = self.region if gaps is None else shapely.difference(self.region, gaps)
         wider.region = shapely.buffer(self.region, by)
         shapely.prepare(wider.region)
         wider._gaps = None if gaps is None else _beyond(wider.region, shapely.buffer(sections, by))
@@ -231,23 +228,36 @@ class RoadBoundary:
     def surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
         """Poses (K,) that lie inside because a larger box does; False says nothing.
 
-        One box, turned like the pose in its middle, holds several consecutive poses: asking about
-        boxes instead of poses saves most of the geometry library's time. Its half sizes grow by what
-        a pose turned by an angle t reaches farther, at most size * |t|.
-
         Parameters
         ----------
         x, y, orientation : (K,) array
             Centre [m] and orientation [rad] of the ego.
         """
+        known = np.zeros(len(x), dtype=np.bool_)
+        pose, boxes = self._around(x, y, orientation)
+        inside = self.inside(boxes)
+        known[pose[:, inside] if not inside.all() else pose] = True
+        return known
+
+    def _around(self, x: Array, y: Array, orientation: Array) -> tuple[npt.NDArray[np.intp], Array]:
+        """Boxes that hold several consecutive poses each; none where they are too far apart, or not finite.
+
+        One box, turned like the pose in its middle, holds several: asking about boxes instead of poses
+        saves most of the geometry library's time. Its half sizes grow by what a pose turned by an angle t
+        reaches farther, at most size * |t|.
+
+        Returns
+        -------
+        pose : (size, G) int array
+            Which poses each of G boxes holds.
+        boxes : (G, 4, 2) array
+            Their corners [m].
+        """
         count = len(x)
-        known = np.zeros(count, dtype=np.bool_)
-        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.nan
-        if not np.isfinite(np.array((x, y, orientation))).all():
-            return known
+        travelled = abs(x[-1] - x[0]) + abs(y[-1] - y[0]) if count else np.inf
         size = min(int(_BOX * count / (travelled + _BOX)), _MOST) if travelled < np.inf else 0
-        if size < 2:
-            return known
+        if size < 2 or not np.isfinite(np.array((x, y, orientation))).all():
+            return np.empty((0, 0), dtype=np.intp), np.empty((0, 4, 2))
         pose = grouping(count, size)
         middle = pose[size // 2]
         centre = x + 1j * y
@@ -261,9 +271,7 @@ class RoadBoundary:
         sides[:, 2:] = np.maximum.reduce(seen, axis=0).reshape(-1, 2) + half
         corners = sides.take(_AROUND, axis=1).view(np.complex128)[..., 0]
         corners = corners * axis[:, None] + origin[:, None]
-        inside = self.inside(corners.view(np.float64).reshape(-1, 4, 2))
-        known[pose[:, inside] if not inside.all() else slice(None)] = True
-        return known
+        return pose, corners.view(np.float64).reshape(-1, 4, 2)
 
     def outline(self, x: Array, y: Array, orientation: Array) -> Array:
         """Corners of the ego's rectangle (K, 4, 2) at poses (K,), anticlockwise [m].
