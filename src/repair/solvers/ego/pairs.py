@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from repair.arrays import Array
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 
-__all__ = ["Pairs", "anchor_pairs", "closest_distance"]
+__all__ = ["Pairs", "anchor_pairs", "closest_distance", "pushes"]
 
 # NumPy compares with plain integers several times faster than with an enumeration's members.
 # The sides up to this one are about s, the others about l.
@@ -100,3 +101,26 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
 def closest_distance(pairs: Pairs, points: Array) -> float:
     """Smallest obstacle distance of all pairs, inf without any."""
     return float(pairs.distance(points).min()) if pairs.row.size else float("inf")
+
+
+def pushes(pairs: Pairs, points: Array) -> int:
+    """How often lambda_c has to be doubled at least until no pair collides any more.
+
+    At a minimum j_c pushes a point out of a box as hard as the rest of the cost pushes it in, which at the
+    edge pushes no less (it is convex). There, with an excess of s_f, the slope of j_c is 3 s_f²; at a
+    distance d < 0, with s_f - d, it is 1 - 2 d / s_f times that. With several pairs, which may help one
+    another, this is a guess.
+
+    Returns
+    -------
+    int
+        0 where none collides.
+    """
+    distance = pairs.distance(points)
+    if not len(distance) or distance.item(distance.argmin()) >= 0.0:
+        return 0
+    collides = distance < _ZERO
+    threshold = pairs.threshold[collides]
+    if not threshold.all():
+        return 1
+    return max(math.ceil(math.log2(1.0 - 2.0 * float((distance[collides] / threshold).min()))), 1)

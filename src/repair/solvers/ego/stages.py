@@ -13,7 +13,7 @@ from repair.solvers.ego.bounds import bend_speed, feasibility, slowest_bend, wit
 from repair.solvers.ego.cost_structure import SIZES, Sizes
 from repair.solvers.ego.fitting_term import fitting_band
 from repair.solvers.ego.minimise import Minimiser, Minimum, minimiser
-from repair.solvers.ego.pairs import Pairs, anchor_pairs, closest_distance
+from repair.solvers.ego.pairs import Pairs, anchor_pairs, pushes
 from repair.solvers.ego.penalties import SoftBounds
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
 from repair.solvers.ego.spline_cost import SplineCost, resting_cost
@@ -71,6 +71,8 @@ class Stages:
     def deform(self, problem: RepairProblem, initial: UniformBSpline, deadline: float | None) -> Deformed:
         """Minimise J; while control points still collide, double lambda_c and start again.
 
+        It is doubled as often at once as the deepest collision takes at least.
+
         Parameters
         ----------
         problem : RepairProblem
@@ -94,20 +96,23 @@ class Stages:
         resting = self._resting(problem, initial.points, spacing, config.deform)
         led = shape
         straight = slowest_bend(problem) >= config.elastic * problem.limits.v_max
-        for rounds in range(1, config.rebounds + 2):
+        left, rounds = config.rebounds, 0
+        while True:
+            rounds += 1
             cap = None if straight else self._cap(problem, led)
             minimum = self._minimise_deformation(
                 problem, minimum.points, spacing, moved, collision, cap, resting, deadline
             )
-            if rounds > config.rebounds:
+            if not left:
                 break
             led = minimum.points
-            clear = closest_distance(pairs, led) >= 0.0
+            doublings = pushes(pairs, led)
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
-            if clear and (cap is None or _slow_enough(problem, led, spacing)):
+            if not doublings and (cap is None or _slow_enough(problem, led, spacing)):
                 break
-            if not clear:
-                collision *= 2.0
+            doublings = min(doublings, left)
+            collision *= 2.0**doublings
+            left -= max(doublings, 1)
         return Deformed(minimum, pairs, cap, rounds)
 
     def refine(
