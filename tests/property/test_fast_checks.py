@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -122,6 +123,24 @@ def test_a_box_around_several_poses_is_on_the_road_only_if_they_are(seed):
     assert inside[road.surely_inside(x, y, heading)].all()
     first = road.first_off_road(x, y, heading)
     assert first == (None if inside.all() else int(np.argmin(inside)))
+
+
+@settings(max_examples=120, derandomize=True, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_first_gap_that_is_crossed_is_that_of_one_pose_after_the_other(seed):
+    rng = np.random.default_rng(seed)
+    road = ragged_road(rng)
+    corner = np.column_stack((rng.uniform(0, 60, 6), rng.uniform(-6, 6, 6)))
+    gaps = shapely.union_all(shapely.box(*corner.T, *(corner + rng.uniform(0.01, 1.5, (6, 2))).T))
+    shapely.prepare(gaps)
+    road.__dict__["_gaps"] = gaps
+    x, y, heading = driven(rng, int(rng.integers(1, 90)), 3.0)
+    if rng.random() < 0.2:
+        x[rng.integers(len(x))] = np.nan
+    bodies = shapely.polygons(road.outline(x, y, heading))
+    crossed = np.flatnonzero(shapely.area(shapely.intersection(bodies, gaps)) > 1e-5)
+    found = road.over_a_gap(x, y, heading)
+    assert (found and found[0]) == (int(crossed[0]) if len(crossed) else None)
 
 
 def test_most_poses_on_a_wide_road_are_settled_by_boxes():

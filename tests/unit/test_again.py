@@ -15,7 +15,7 @@ import repair
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.problem.problem import Maneuver
 from repair.search.again import Notches, other_ways, too_close
-from repair.search.result import SearchStatus
+from repair.search.result import Like, Probe, SearchStatus
 from repair.search.search import search_f_ttr
 from repair.search.settings import SearchConfig
 
@@ -59,6 +59,7 @@ class Demanding:
 def searched(checker, source=None, backend=None, like=None, **settings):
     keys = SearchConfig(upper=0.0, **settings)
     source = source or Tightening()
+    like = Like(like) if isinstance(like, Probe) else like
     return search_f_ttr(source, Conflict(2.0, "margin"), backend or FakeBackend(), checker, keys, like=like)
 
 
@@ -133,6 +134,29 @@ def test_where_that_does_not_pass_the_answer_is_as_if_it_was_not_known(needs):
     alone, checker = searched(Demanding(needs)).probes[0], Demanding(needs)
     (probe,) = searched(checker, like=before).probes
     assert (probe.verdict, probe.tried, probe.tightened) == (alone.verdict, alone.tried, alone.tightened)
+
+
+@pytest.mark.parametrize("more", [{}, {Reason.OFF_ROAD: 0.1}])
+def test_where_it_is_unlikely_to_pass_too_close_with_more_room_is_too_close_with_less(more):
+    before = searched(Demanding({Reason.MARGIN: 0.2})).probes[0]
+    assert before.tightened == (0.3, 0.0, 0.0)
+    checker = Demanding({Reason.MARGIN: 0.6, **more})
+    (probe,) = searched(checker, like=Like(before, 0.0)).probes
+    assert probe.feasible
+    assert checker.seen == [(0.3, 0.0, 0.0), (0.6, 0.1 if more else 0.0, 0.0)]
+    # nor is it given up for what it misses with more room only
+    checker = Demanding({Reason.OFF_ROAD: 0.1})
+    assert searched(checker, like=Like(before, 0.0)).probes[0].tightened == (0.0, 0.1, 0.0)
+    assert checker.seen == [(0.3, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.1, 0.0)]
+
+
+def test_the_other_sides_are_asked_all_the_same():
+    before = searched(Demanding({Reason.MARGIN: 0.2})).probes[0]
+    checker, backend = Demanding({Reason.MARGIN: 9.0}), FakeBackend()
+    source = Tightening((Maneuver.YIELD, Maneuver.LEFT))
+    assert not searched(checker, source, backend, like=Like(before, 0.0)).probes[0].feasible
+    assert checker.seen[:2] == [(0.3, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    assert sorted(checker.seen[2:]) == [(0.3, 0.0, 0.0), (0.6, 0.0, 0.0), (0.6, 0.0, 0.0)]
 
 
 def test_nothing_is_asked_twice_for_it():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from repair.solvers.ego.backend import EgoBackend
 from repair.solvers.ego.bounds import bend_speed, slowest_bend
 from repair.solvers.ego.cost_structure import SIZES, Sizes, cost_structure
 from repair.solvers.ego.minimise import Minimum, minimiser, newton
-from repair.solvers.ego.pairs import anchor_pairs
+from repair.solvers.ego.pairs import Pairs, anchor_pairs, pushes
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
 
 # The paper's two stages and nothing else.
@@ -412,6 +413,38 @@ def test_a_wall_is_kept_clear_of_and_rebounds_push_harder():
     assert end[1] > 25.0  # too soft: the control points collide
     assert end[2] < end[1]
     assert "round(s)" in hard.detail
+
+
+@pytest.mark.parametrize("push", [1.0, 1.9, 3.0, 8.0, 200.0])
+def test_lambda_c_is_doubled_as_often_as_it_takes(push):
+    """One control point, pushed into a box by a constant force."""
+    room, joint = 0.3, 3.0 * 0.3**2
+    force = push * joint
+    depth = room * (1.0 + force / joint) / 2.0  # where 6 D e - 3 D^2 is the force
+    pairs = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, room)))
+    found = pushes(pairs, np.array([[10.0 - room + depth, 0.0]]))
+    assert found == (math.ceil(math.log2(push)) if push > 1.0 else 0)
+    assert force <= 2.0**found * joint + 1e-9  # with an excess of D it is out of the box
+
+
+def test_nobody_doubles_where_nothing_collides_or_no_room_is_wanted():
+    none = Pairs(*(np.empty(0, dtype=np.intp) for _ in range(5)))
+    assert pushes(none, np.zeros((3, 2))) == 0
+    touching = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, 0.0)))
+    assert pushes(touching, np.array([[11.0, 0.0]])) == 1
+
+
+@pytest.mark.parametrize("rebounds", [0, 1, 3])
+def test_lambda_c_is_doubled_no_more_often_than_asked(rebounds):
+    """The deformation is the same as that of a weight so many times larger."""
+    boxes = (toy.box((5.0, 60.0), (-20.0, 20.0)),)  # too close to stop in front of it
+    problem = make_problem(Side.BEHIND, boxes=boxes, lateral=False)
+    found = EgoBackend(replace(PLAIN, rebounds=rebounds)).solve(problem)
+    weight = PLAIN.deform.collision * 2.0**rebounds
+    alike = EgoBackend(replace(PLAIN, deform=DeformWeights(collision=weight))).solve(problem)
+    got, wanted = (r.stages["deformation"].points for r in (found, alike))
+    np.testing.assert_allclose(got, wanted, atol=1e-3)
+    assert got[-1, 0] > 5.0
 
 
 def test_braking_does_not_reverse():

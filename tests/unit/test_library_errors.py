@@ -22,6 +22,7 @@ from repair.backend.guard import Guarded
 from repair.check.registry import CHECKS
 from repair.config.load import load_config
 from repair.curves.base import FrenetTrajectory
+from repair.curves.bspline import UniformBSpline
 from repair.errors import BackendError, RepairError, in_words, path_of
 from repair.metrics.registry import METRICS
 from repair.reference.registry import SOURCES
@@ -235,6 +236,11 @@ def _hole(found):
     return FrenetTrajectory(found.t, position, found.velocity, found.acceleration, found.jerk)
 
 
+def _spline(answer, change):
+    assert isinstance(answer.curve, UniformBSpline)
+    return replace(answer, curve=replace(answer.curve, points=change(answer.curve.points)))
+
+
 def _short(answer, problem):
     curve = Broken(answer.curve, lambda found: found)
     curve.t_end = problem.t_rep + 0.1
@@ -252,6 +258,10 @@ ANSWERS = {
     "as its curve": lambda answer, problem: replace(answer, curve=np.zeros(3)),
     "as its curve, which needs t_start": lambda answer, problem: replace(answer, curve=Unreadable()),
     "not finite": lambda answer, problem: replace(answer, curve=Broken(answer.curve, _hole)),
+    "a curve that is not finite": lambda answer, problem: _spline(answer, lambda points: points * np.nan),
+    "samples of shape (9, 3)": lambda answer, problem: _spline(
+        answer, lambda points: np.hstack([points, points[:, :1]])
+    ),
     "was asked for": _short,
     "FrenetTrajectory": lambda answer, problem: replace(
         answer, curve=Broken(answer.curve, lambda found: found.t)

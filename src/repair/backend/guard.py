@@ -10,6 +10,7 @@ import numpy as np
 
 from repair.backend.base import Closest, RepairBackend, SolveResult, SolveStatus
 from repair.curves.base import Curve, FrenetTrajectory, is_curve
+from repair.curves.bspline import UniformBSpline
 from repair.errors import BackendError, foreign, in_words, kind_of
 from repair.problem.problem import RepairProblem
 from repair.timegrid import STEP
@@ -96,6 +97,8 @@ def _wrong_curve(curve: Any, problem: RepairProblem) -> str:
     if not (start <= problem.t_rep + STEP and end >= problem.t_end - STEP):
         span = f"from {start:g} to {end:g} s"
         return f"a curve {span} where one from {problem.t_rep:g} to {problem.t_end:g} s was asked for"
+    if type(curve) is UniformBSpline and _are_points(curve.points, curve.degree):
+        return ""
     times = np.linspace(problem.t_rep, problem.t_end, _LOOKED_AT)
     try:
         found: Any = curve.sample(times)
@@ -109,3 +112,10 @@ def _wrong_curve(curve: Any, problem: RepairProblem) -> str:
         if not np.isfinite(column).all():
             return "a curve that is not finite"
     return ""
+
+
+def _are_points(points: Any, degree: int) -> bool:
+    """Whether a B-spline of these control points can be sampled, and is finite."""
+    if not (isinstance(points, np.ndarray) and points.dtype == np.float64 and points.ndim == 2):
+        return False
+    return points.shape[0] > degree and points.shape[1] == 2 and bool(np.isfinite(points).all())

@@ -32,7 +32,7 @@ def hold_ends(times: bytes, t_start: float, t_end: float, values: Callable[[byte
         The matrix for times (bytes) within the span, counted from its start.
     """
     since = np.frombuffer(times) - t_start
-    tau = np.clip(since, 0.0, t_end - t_start)
+    tau = np.minimum(np.maximum(since, 0.0), t_end - t_start)
     # The same offsets come back for other start times, up to rounding.
     matrix = values(np.round(tau, 12).tobytes())
     beyond = since - tau

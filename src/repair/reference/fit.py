@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ _FIT_OFF = 0.05  # a spline farther from the positions than this [m] gets more f
 _ROUGH = 2.0  # accelerations that swing and jump by more come from rounding [m/s²]
 _DENSE = 0.5  # positions between the steps are at most this far apart [m]
 _PARTS = 4  # of a step, at whose ends a curve is looked at
+_SHORT = 200  # steps of a plan up to which what fits a spline to such plans is kept
 
 
 def fit_recording(
@@ -251,11 +252,39 @@ def _smooth(
     return best, off
 
 
+class _Observed(NamedTuple):
+    """Least squares for a spline with some of the derivatives at its start given.
+
+    Attributes
+    ----------
+    left : (count + n - 3, n) array
+        From control points to positions at the steps, and to a whisper of smoothing.
+    columns : (count + n - 3, n - given) array
+        The same from what is free: what is not given of the start, then the other control points.
+    inverse : (n - given, count + n - 3) array or None
+        Pseudo-inverse of ``columns``: worth its time where one plan after the other is as long, too slow to
+        make where many steps are fitted once.
+    """
+
+    left: Array
+    columns: Array
+    inverse: Array | None
+
+    def solved(self, right: Array) -> Array:
+        """What is free, where ``columns`` times it comes closest to ``right``."""
+        if self.inverse is None:
+            return np.asarray(np.linalg.lstsq(self.columns, right, rcond=None)[0])
+        return np.asarray(self.inverse @ right)
+
+
 @lru_cache(maxsize=16)
-def _observed(count: int, dt: float, n: int, spacing: float) -> Array:
-    """Map (count + n - 3, n) from control points to positions at the steps, and to a whisper of smoothing."""
+def _observed(count: int, dt: float, n: int, spacing: float, given: int) -> _Observed:
     basis = basis_matrix(np.arange(count) * dt, n, _DEGREE, spacing)
-    return frozen(np.vstack([basis, 1e-3 * np.diff(np.eye(n), n=3, axis=0)]))
+    left = np.vstack([basis, 1e-3 * np.diff(np.eye(n), n=3, axis=0)])
+    free = splice_points(np.eye(_DEGREE), _DEGREE, spacing)[:, given:]
+    columns = np.hstack([left[:, :_DEGREE] @ free, left[:, _DEGREE:]])
+    inverse = frozen(np.linalg.pinv(columns)) if count <= _SHORT else None
+    return _Observed(frozen(left), frozen(columns), inverse)
 
 
 def _fitted(coordinates: Array, state: Array, dt: float, spacing: float) -> tuple[UniformBSpline, float]:
@@ -265,21 +294,14 @@ def _fitted(coordinates: Array, state: Array, dt: float, spacing: float) -> tupl
     spacing = duration / (n - _DEGREE)
     if spacing * (n - _DEGREE) > duration:  # by a rounding error
         spacing = float(np.nextafter(spacing, 0.0))
-    left = _observed(len(coordinates), dt, n, spacing)
-    basis = left[: len(coordinates)]
+    observed = _observed(len(coordinates), dt, n, spacing, len(state))
+    left, basis = observed.left, observed.left[: len(coordinates)]
     right = np.vstack([coordinates, np.zeros((len(left) - len(coordinates), 2))])
-    if len(state) < _DEGREE:
-        # What is not given is found: the start is linear in it.
-        heads = splice_points(np.eye(_DEGREE), _DEGREE, spacing)
-        given, free = heads[:, : len(state)] @ state, heads[:, len(state) :]
-        right = right - left[:, :_DEGREE] @ given
-        columns = np.hstack([left[:, :_DEGREE] @ free, left[:, _DEGREE:]])
-        found = np.linalg.lstsq(columns, right, rcond=None)[0]
-        head = given + free @ found[: _DEGREE - len(state)]
-        tail = found[_DEGREE - len(state) :]
-    else:
-        head = splice_points(state, _DEGREE, spacing)
-        tail = np.linalg.lstsq(left[:, _DEGREE:], right - left[:, :_DEGREE] @ head, rcond=None)[0]
-    points = np.vstack([head, tail])
+    # What is not given of the start is found: it is linear in that.
+    given, free = np.split(splice_points(np.eye(_DEGREE), _DEGREE, spacing), [len(state)], axis=1)
+    head = given @ state
+    found = observed.solved(right - left[:, :_DEGREE] @ head)
+    more = _DEGREE - len(state)
+    points = np.vstack([head + free @ found[:more], found[more:]])
     miss = float(np.abs(basis @ points - coordinates).max())
     return UniformBSpline(0.0, spacing, _DEGREE, frozen(points)), miss

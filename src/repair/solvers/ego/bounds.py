@@ -22,6 +22,15 @@ def feasibility(
     n: int, limits: Limits, config: tuple[float, ...], scale: float, axes: tuple[int, ...]
 ) -> SoftBounds:
     """Bounds of the stacked derivatives on some axes, and of their negatives; lambda_d is in the weights."""
+    chosen = slice(axes[0], axes[-1] + 1)
+    return SoftBounds(
+        *(frozen(both[..., chosen].reshape(-1)) for both in _both_axes(n, limits, config, scale))
+    )
+
+
+@lru_cache(maxsize=16)
+def _both_axes(n: int, limits: Limits, config: tuple[float, ...], scale: float) -> tuple[Array, ...]:
+    """The columns of :func:`feasibility`, (2, 3n - 6, 2): upper and lower, by axis."""
     w_v, w_a, w_j, elastic, joint, reverse = config
     maxima = np.array(
         [[limits.v_max, limits.v_lat], [limits.a_max, limits.a_lat], [limits.j_lon, limits.j_lat]]
@@ -29,10 +38,7 @@ def feasibility(
     minima = np.array([[0.0, -limits.v_lat], [limits.a_min, -limits.a_lat], [-limits.j_lon, -limits.j_lat]])
     weights = (scale * w_v, scale * w_a, scale * w_j)
     sides = feasibility_bounds(n, maxima, minima, weights, elastic, joint, reverse)
-    chosen = list(axes)
-    return SoftBounds(
-        *(frozen(np.concatenate([c[:, chosen].ravel() for c in both])) for both in zip(*sides, strict=True))
-    )
+    return tuple(np.array(both) for both in zip(*sides, strict=True))
 
 
 def with_pairs(bounds: SoftBounds, pairs: Pairs, collision: float) -> SoftBounds:
