@@ -332,6 +332,23 @@ def test_who_is_warm_has_kept_nothing_and_knows_how_long_its_parts_take(scene):
     assert not watch.update(plan(scene, 0.1), now=0.1, deadline=1e-4).complete
 
 
+def test_searches_that_are_cut_short_do_not_say_how_long_judging_takes(scene):
+    class Late:
+        name, capabilities = "ego", replace(make_backend("ego", repair.load_config()).capabilities)
+
+        def solve(self, problem, **keys):
+            return SolveResult(SolveStatus.TIME_LIMIT)
+
+    watch = repair.Repairer(scene, backend="ego", overrides=["fallback=[]"])
+    watch.warm(plan(scene))
+    known = watch._paces["judging"].expected
+    assert known > 0.0
+    watch._backend = Late()
+    for _ in range(20):
+        assert watch.update(plan(scene), deadline=60.0).search.probes
+    assert watch._paces["judging"].expected == known
+
+
 def test_a_part_is_not_begun_that_would_not_end_in_time():
     pace = Pace()
     assert pace.expected == 0.0

@@ -274,9 +274,9 @@ class Repairer:
                 found = searched(
                     prepared, self._backend, self._limited(asked), unproven, guess, thorough=True, like=like
                 )
-                if found.probes:
-                    longest = max(probe.check_time for probe in found.probes)
-                    self._paces.setdefault("judging", Pace()).took(longest)
+                # Who was cut short judged for as long as there was time, or not at all.
+                if judged := [probe.check_time for probe in found.probes if probe.solve.curve is not None]:
+                    self._paces.setdefault("judging", Pace()).took(max(judged))
         except OutOfTime:
             pass
         return self._answer(prepared, found, held[0] if held else None, held == [None], asked)
