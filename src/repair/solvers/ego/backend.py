@@ -76,6 +76,7 @@ class EgoBackend:
         self.spacing = spacing
         self.stages = Stages(self.config, degree, minimise, sizes)
         self._path_of = LastPath()
+        self._fitted: tuple[Curve, UniformBSpline] | None = None
 
     def solve(
         self,
@@ -94,7 +95,7 @@ class EgoBackend:
         begin = time.perf_counter()
         deadline = begin + time_limit if time_limit is not None else None
         n, spacing = fitted_knots(problem.t_end - problem.t_rep, self.spacing, self.degree)
-        initial = fit_to_curve(problem.reference, problem.t_rep, n, self.degree, spacing)
+        initial = self._initial(problem.reference, problem.t_rep, n, spacing)
         built = time.perf_counter()
         try:
             deformed, pairs, cap, rounds = self.stages.deform(problem, initial, deadline)
@@ -125,6 +126,17 @@ class EgoBackend:
             f"refinement {refined.iterations}",
             stages=curves,
         )
+
+    def _initial(self, reference: Curve, t_rep: float, n: int, spacing: float) -> UniformBSpline:
+        """The reference from t_rep on; the last answer is kept, as sides are asked one after the other."""
+        known = self._fitted  # read once: another thread may put its own there
+        if known is not None and known[0] is reference:
+            fitted = known[1]
+            if (fitted.t_start, len(fitted.points), fitted.spacing) == (t_rep, n, spacing):
+                return fitted
+        fitted = fit_to_curve(reference, t_rep, n, self.degree, spacing)
+        self._fitted = reference, fitted
+        return fitted
 
     def _driven(self, problem: RepairProblem, minimum: Minimum, spacing: float) -> UniformBSpline:
         points = _standing(minimum.points, self.degree)

@@ -7,6 +7,7 @@ every term couples neighbouring control points only, so that the Hessian is a ba
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -101,8 +102,7 @@ class SplineCost:
         width = 3 * axes if fit is None else max(3 * axes, len(fit) - 1)
         self.axes, self.size, self.free = axes, (last - first) * axes, slice(first, last)
         made = self.structure = cost_structure(n, axes, first, last, spacing, smooth, width, sizes)
-        self._points, self._sign = points, sign
-        self._bounds, self._fit, self._constant = bounds, fit, constant
+        self._paired, self._sign, self._fit, self._constant = paired, sign, fit, constant
         self._coordinate = paired - first * axes if first else paired  # of every pair, in u
         self._diagonal = self._coordinate * (width + 1)  # and in the band
         self._rows = rows = len(made.smooth)
@@ -110,18 +110,29 @@ class SplineCost:
         if fit is not None:
             self._band = made.band.copy()
             self._band.reshape(self.size, width + 1)[:, : len(fit)] += fit.T
-        x = (made.stack @ points).ravel()
-        self._derivatives = x
+        self._start_at(points, bounds)
+        self._matrix = made.dense
+        if len(paired) and made.dense is not None:
+            count = 2 * rows + len(paired)
+            self._matrix = matrix = np.zeros((count, self.size))
+            matrix[: 2 * rows] = made.dense
+            matrix[np.arange(2 * rows, count), self._coordinate] = sign
+
+    def again(self, points: Array, bounds: SoftBounds) -> SplineCost:
+        """The same with other control points at u = 0, and weights and limits of the derivatives."""
+        other = copy(self)
+        other._start_at(points, bounds)
+        return other
+
+    def _start_at(self, points: Array, bounds: SoftBounds) -> None:
+        rows = self._rows
+        self._points, self._bounds = points, bounds
+        self._derivatives = x = (self.structure.stack @ points).ravel()
         self._limit = limit = bounds.limit.copy()  # of what is added to the quantities at u = 0
         limit[:rows] -= x
         limit[rows : 2 * rows] += x
-        self._matrix = made.dense
-        if len(paired):
-            limit[2 * rows :] -= points.ravel()[paired] * sign
-            if made.dense is not None:
-                self._matrix = matrix = np.zeros((len(limit), self.size))
-                matrix[: 2 * rows] = made.dense
-                matrix[np.arange(2 * rows, len(limit)), self._coordinate] = sign
+        if len(self._paired):
+            limit[2 * rows :] -= points.ravel()[self._paired] * self._sign
 
     def points(self, u: Array) -> Array:
         """Control points (n, axes) at the displacements u."""

@@ -96,13 +96,12 @@ class Stages:
         resting = self._resting(problem, initial.points, spacing, config.deform)
         led = shape
         straight = slowest_bend(problem) >= config.elastic * problem.limits.v_max
-        left, rounds = config.rebounds, 0
+        left, rounds, cost = config.rebounds, 0, None
         while True:
             rounds += 1
             cap = None if straight else self._cap(problem, led)
-            minimum = self._minimise_deformation(
-                problem, minimum.points, spacing, moved, collision, cap, resting, deadline
-            )
+            cost = self._deforming(problem, minimum.points, spacing, moved, collision, cap, resting, cost)
+            minimum = self._whole(cost, minimum.points, deadline)
             if not left:
                 break
             led = minimum.points
@@ -154,7 +153,7 @@ class Stages:
         )  # fmt: skip
         return self._whole(cost, points, deadline, near_closed_form=True)
 
-    def _minimise_deformation(
+    def _deforming(
         self,
         problem: RepairProblem,
         start: Array,
@@ -163,17 +162,19 @@ class Stages:
         collision: float,
         cap: Array | None,
         resting: float,
-        deadline: float | None,
-    ) -> Minimum:
+        last: SplineCost | None,
+    ) -> SplineCost:
+        """J with some lambda_c; ``last`` is that of the round before."""
         weights, n = self.config.deform, len(start)
         axes = 2 if problem.lateral else 1
         bounds = with_pairs(self._bounds(problem, n, weights.feasible, cap), pairs, collision)
-        cost = SplineCost(
+        if last is not None:
+            return last.again(start[:, :axes], bounds)
+        return SplineCost(
             start[:, :axes], self.degree, n, spacing, weights.smooth, bounds,
             pairs.row * axes + pairs.axis, -pairs.sign,
             constant=resting, sizes=self.sizes,
         )  # fmt: skip
-        return self._whole(cost, start, deadline)
 
     def _cap(self, problem: RepairProblem, led: Array) -> Array | None:
         """The speeds (n - 1,) that a bend allows, where it matters."""
