@@ -47,7 +47,7 @@ class EgoConfig:
     solver: str = setting("newton", "two ways to the same minimum", choices=("newton", "lbfgs"))
     max_iterations: int = setting(100, "in each stage (100 in the paper, of L-BFGS)", low=1, high=100_000)
     tolerance: float = setting(0.01, "on the gradient (0.01 in the paper)", low=1e-12, high=1e3)
-    rebounds: int = setting(3, "restarts with a doubled lambda_c while a collision remains", low=0, high=20)
+    rebounds: int = setting(3, "doublings of lambda_c at most, while a collision remains", low=0, high=20)
     precondition: bool = setting(
         True,
         "L-BFGS with the quadratic part made round: same optimum, faster",
