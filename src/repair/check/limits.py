@@ -160,7 +160,7 @@ def _driven(frame: FrenetFrame, samples: FrenetTrajectory) -> tuple[Array, Array
     forward = scale * v
     along = scale * a - 2.0 * kappa * v * w - rate * l * v * v
     across = b + forward * kappa * v
-    speed = np.hypot(forward, w)
+    speed = np.sqrt(forward * forward + w * w)  # hypot takes far longer
     moving = speed > _STANDS
     if np.count_nonzero(moving) == len(moving):
         cos, sin = forward / speed, w / speed
@@ -293,7 +293,7 @@ def _against(
     values[0], values[1] = -along, along
     values[2] = along / engine
     values[3] = np.abs(across)
-    np.hypot(along, across, out=values[4])
+    np.sqrt(along * along + across * across, out=values[4])
     powered = 1.0 if math.isfinite(c.a_max) else math.inf
     most = np.array((-c.a_min * more, c.a_max * more, powered, c.a_lat * more, c.a_total * more))
     adds = np.array((1.0, 1.0, 1.0 / smallest(engine), 1.0, 1.0))
