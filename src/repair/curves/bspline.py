@@ -86,7 +86,7 @@ def sampling_at(
 
 
 # A planner's cycle asks for some twenty, mostly others than the one before; each takes 100 kB at most.
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=160)
 def _dense_at(times: bytes, t_start: float, n: int, degree: int, spacing: float) -> Array:
     t_end = t_start + (n - degree) * spacing
     return hold_ends(times, t_start, t_end, lambda offsets: _sampling(offsets, n, degree, spacing))
