@@ -14,6 +14,7 @@ from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import Config, load_config
 from repair.errors import BackendError
+from repair.problem.factory import Relaxed
 from repair.problem.problem import Maneuver, Passing
 from repair.search.result import SearchStatus
 from repair.search.rules import probe_order
@@ -509,7 +510,7 @@ def test_margins_that_there_was_no_time_for_are_no_verdict():
 
     class Relaxing(FakeSource):
         def relaxed(self, t_rep):
-            yield self.at(t_rep)
+            return (self.at(t_rep),)
 
     backend = FakeBackend(on_solve=lambda: clock.tick(1.0), capabilities=Capabilities(relaxes=True))
     keys = {"source": Relaxing(), "backend": backend, "clock": clock, "rule": "bisect"}
@@ -613,23 +614,25 @@ class Relaxing(FakeSource):
         super().__init__()
         self.margins, self.opens, self.strict = margins, opens or {}, strict
         self.guide = toy.constant(10.0 - slower).sample(np.arange(3.0))
-        self.sides = sides or {}  # of one box, from a margin on down
+        self.sides = sides or {}  # of each box, from a margin on down
 
     def at(self, t_rep, margin=0.1):
-        box, sides = toy.occupancy(toy.box((50, 55), (-1, 1))), [0, 0, 0]
+        sides = [0, 0, 0]
         for least, others in self.sides.items():
             sides = others if margin <= least else sides
+        sides = np.atleast_2d(np.array(sides, dtype=np.int8))
+        boxes = toy.occupancy(*[toy.box((50, 55), (-1, 1))] * len(sides))
         return tuple(
             replace(
-                problem, margin=margin, strict=self.strict, occupancy=box,
-                passing=replace(problem.passing, guide=self.guide, sides=np.array([sides], dtype=np.int8)),
+                problem, margin=margin, strict=self.strict, occupancy=boxes,
+                passing=replace(problem.passing, guide=self.guide, sides=sides),
             )
             for problem in super().at(t_rep)
             if margin <= self.opens.get(problem.passing.maneuver, math.inf)
         )  # fmt: skip
 
     def relaxed(self, t_rep):
-        return (self.at(t_rep, margin) for margin in self.margins)
+        return [self.at(t_rep, margin) for margin in self.margins]
 
 
 class Narrow(FakeBackend):
@@ -700,7 +703,7 @@ def asked_margins(maneuver, reasons, sides=None, slower=5.0, contact=2.95):
     class Refusing:
         def check(self, problem, curve):
             missed = reasons if problem.margin > -0.25 else (Reason.OFF_ROAD,)
-            return Verdict(tuple(Violation(reason, problem.t_rep) for reason in missed))
+            return Verdict(tuple(Violation(reason, problem.t_rep, "", 100) for reason in missed))
 
     conflict = Conflict(2.9, "margin", 7, contact)
     (probe,) = search(Refusing(), source=source, backend=backend, upper=0.0, conflict=conflict).probes
@@ -731,6 +734,32 @@ def test_another_way_past_the_same_obstacles_is_asked():
     assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1], -0.3: [2, 2, 1]}) == [-0.22, -0.3]
     assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 0, 0]}) == []
     assert asked_margins(Maneuver.LEFT, (Reason.MARGIN, Reason.LIMITS), {-0.1: [2, 2, 2]}) == ALL
+    # The sides taken of others do not keep it from the one that it came too close to.
+    first = {0.1: [[0, 0, 2], [0, 0, 0]]}
+    assert asked_margins(Maneuver.YIELD, too_close, first | {-0.2: [[0, 2, 2], [0, 3, 3]]}) == []
+    assert asked_margins(Maneuver.YIELD, too_close, first | {-0.2: [[0, 2, 1], [0, 0, 0]]}) == [-0.22]
+
+
+def test_margins_are_not_made_where_the_smallest_is_of_no_use():
+    made = []
+
+    class Counting(Relaxing):
+        def relaxed(self, t_rep):
+            return Relaxed(lambda margin: made.append(margin) or self.at(t_rep, margin), self.margins)
+
+    class Refusing:
+        def check(self, problem, curve):
+            return Verdict((Violation(Reason.COLLISION, problem.t_rep, "", 100),))
+
+    def asked(sides):
+        made.clear()
+        backend = Narrow({Maneuver.YIELD: -1.0}, {Maneuver.YIELD}, capabilities=Capabilities(relaxes=True))
+        source = Counting(-0.1, -0.2, -0.3, sides=sides)
+        search(Refusing(), source=source, backend=backend, upper=0.0)
+        return made
+
+    assert asked({}) == [-0.3]
+    assert asked({-0.3: [0, 2, 2]}) == [-0.3, -0.1, -0.2]
 
 
 def test_a_guide_that_follows_the_reference_into_what_it_meets_is_not_asked():

@@ -7,7 +7,7 @@ finds too close needs more room, not less. So most of the margins that ``repair.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ _Way = tuple[object, ...]
 def probe_smaller(
     probe: Probe,
     rejected: Rejected,
-    relaxed: Iterable[Sequence[RepairProblem]],
+    relaxed: Sequence[Sequence[RepairProblem]],
     ask: Callable[[Sequence[RepairProblem]], tuple[Probe, Rejected]],
     budget: Budget,
 ) -> Probe:
@@ -47,33 +47,47 @@ def probe_smaller(
         With the usual margin; the answer where none is of use.
     rejected : sequence of (RepairProblem, Probe)
         What came of its sides.
-    relaxed : iterable of sequence of RepairProblem
-        The problems with smaller and smaller margins.
+    relaxed : sequence of sequence of RepairProblem
+        The problems with smaller and smaller margins, made as they are looked at. Where no way may pass with
+        the smallest of use, those with larger ones are not made: with less of the boxes in its way a guide
+        passes differently, if at all.
     ask : callable
         Solves and checks problems of one margin: the best of them, and those that failed.
     budget : Budget
     """
-    enough: dict[_Way, float] = {}  # from which margin on a side, or a way, may pass [m]
+    enough: dict[_Way, float] = {}  # from which margin on a side, or a way past an obstacle, may do [m]
+    near: set[int] = set()  # the obstacles that curves came too close to
 
     def learn(failed: Rejected) -> None:
         for problem, one in failed:
             side = _side(problem)
             enough[side] = min(enough.get(side, math.inf), _enough(problem, one, _OFF))
-            if one.refused is not None and too_close(one.refused):
-                way = _way(problem)
-                known = -math.inf if _in_vain(problem, one.refused) else _enough(problem, one, _NEAR)
+            if one.refused is None:
+                continue
+            known = -math.inf if _in_vain(problem, one.refused) else _enough(problem, one, _NEAR)
+            for obstacle in _met(problem, one.refused):
+                near.add(obstacle)
+                way = _way(problem, obstacle)
                 enough[way] = min(enough.get(way, math.inf), known)
 
+    def may_pass(problem: RepairProblem) -> bool:
+        ways = (_side(problem), *(_way(problem, obstacle) for obstacle in near))
+        return all(problem.margin <= enough.get(way, math.inf) for way in ways)
+
+    def evades(problem: RepairProblem) -> bool:
+        return not (budget.collides and _as_planned(problem))
+
     learn(rejected)
-    for problems in relaxed:
+    last: Sequence[RepairProblem] | None = None
+    for k in range(len(relaxed)):
         if budget.spent:
             budget.cut = True
             break
-        wanted = [
-            p for p in problems
-            if all(p.margin <= enough.get(way(p), math.inf) for way in (_side, _way))
-            and not (budget.collides and _as_planned(p))
-        ]  # fmt: skip
+        if last is None:
+            last = next((problems for problems in reversed(relaxed) if any(map(evades, problems))), ())
+        if not any(map(may_pass, last)):
+            break
+        wanted = [problem for problem in relaxed[k] if may_pass(problem) and evades(problem)]
         if not wanted:
             continue
         again, failed = ask(wanted)
@@ -114,16 +128,21 @@ def _side(problem: RepairProblem) -> _Way:
     return () if problem.passing is None else (problem.passing.maneuver,)
 
 
-def _way(problem: RepairProblem) -> _Way:
-    """On which sides a problem's guide passes the obstacles, one after the other; sideways also when."""
+def _met(problem: RepairProblem, refused: Verdict) -> set[int]:
+    """Which of a problem's obstacles a curve that was refused came too close to."""
+    close = {v.obstacle_id for v in refused.violations if v.reason in (Reason.COLLISION, Reason.MARGIN)}
+    return set(problem.occupancy.ids.tolist()) & close
+
+
+def _way(problem: RepairProblem, obstacle: int) -> _Way:
+    """On which sides a problem's guide passes an obstacle, one after the other; sideways also when."""
     if problem.passing is None:
-        return ()
-    sides, maneuver = problem.passing.side, problem.passing.maneuver
-    ids = problem.occupancy.ids.tolist()
+        return (obstacle,)
+    maneuver, rows = problem.passing.maneuver, problem.passing.side[problem.occupancy.ids == obstacle]
     if maneuver in (Maneuver.LEFT, Maneuver.RIGHT):
-        return (maneuver, *ids, sides.tobytes())
-    changes = np.diff(sides, axis=1, prepend=-1) != 0
-    return (maneuver, *ids, *(tuple(row[new].tolist()) for row, new in zip(sides, changes, strict=True)))
+        return (maneuver, obstacle, rows.tobytes())
+    changes = np.diff(rows, axis=1, prepend=-1) != 0
+    return (maneuver, obstacle, *(tuple(row[new].tolist()) for row, new in zip(rows, changes, strict=True)))
 
 
 def with_margin(probe: Probe, again: Probe, margin: float) -> Probe:
