@@ -262,6 +262,12 @@ ANSWERS = {
     "samples of shape (9, 3)": lambda answer, problem: _spline(
         answer, lambda points: np.hstack([points, points[:, :1]])
     ),
+    "numbers beyond 1e+15": lambda answer, problem: _spline(answer, lambda points: points * 1e200),
+    "cannot be sampled (OverflowError": lambda answer, problem: replace(
+        answer, curve=replace(answer.curve, spacing=1e300)
+    ),
+    "cannot be sampled (ValueError": lambda answer, problem: _spline(answer, np.ma.masked_array),
+    "a B-spline of degree 0": lambda answer, problem: replace(answer, curve=replace(answer.curve, degree=0)),
     "was asked for": _short,
     "FrenetTrajectory": lambda answer, problem: replace(
         answer, curve=Broken(answer.curve, lambda found: found.t)
@@ -299,6 +305,13 @@ def test_a_backend_that_answers_nonsense_is_named(words, scene, registered):
         repair.repair(scene, overrides=CONSTANT, backend="strange")
     text = sentence(caught.value)
     assert words in text or words == "closest nothing"
+
+
+@pytest.mark.parametrize("far", [-1e3, 1e9, -1e9])
+def test_a_curve_that_leads_nowhere_is_refused(far, scene, registered):
+    registered(lambda answer, problem: _spline(answer, lambda points: points * far))
+    result = repair.repair(scene, overrides=[*CONSTANT, "fallback=[]"], backend="strange")
+    assert result.status.value == "none_feasible"
 
 
 def test_a_backend_that_cannot_be_made(scene):

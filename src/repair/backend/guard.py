@@ -18,6 +18,8 @@ from repair.timegrid import STEP
 __all__ = ["Guarded"]
 
 _LOOKED_AT = 9  # places of a curve
+_FAR = 1e15  # from here on a tenth of a metre is lost in the rounding
+_KNOTS = 1e-3, 1e3  # [s], between which a spline's derivatives are as finite as its control points
 
 
 class Guarded:
@@ -97,8 +99,11 @@ def _wrong_curve(curve: Any, problem: RepairProblem) -> str:
     if not (start <= problem.t_rep + STEP and end >= problem.t_end - STEP):
         span = f"from {start:g} to {end:g} s"
         return f"a curve {span} where one from {problem.t_rep:g} to {problem.t_end:g} s was asked for"
-    if type(curve) is UniformBSpline and _are_points(curve.points, curve.degree):
-        return ""
+    if type(curve) is UniformBSpline:
+        if not isinstance(curve.degree, Integral) or curve.degree < 1:
+            return f"a B-spline of degree {in_words(curve.degree)}"
+        if _surely_finite(curve):
+            return ""
     times = np.linspace(problem.t_rep, problem.t_end, _LOOKED_AT)
     try:
         found: Any = curve.sample(times)
@@ -111,11 +116,16 @@ def _wrong_curve(curve: Any, problem: RepairProblem) -> str:
             return f"a curve with samples of shape {np.shape(column)} instead of {(_LOOKED_AT, 2)}"
         if not np.isfinite(column).all():
             return "a curve that is not finite"
+        if not (np.abs(column) < _FAR).all():
+            return f"a curve with numbers beyond {_FAR:g}"
     return ""
 
 
-def _are_points(points: Any, degree: int) -> bool:
-    """Whether a B-spline of these control points can be sampled, and is finite."""
-    if not (isinstance(points, np.ndarray) and points.dtype == np.float64 and points.ndim == 2):
+def _surely_finite(curve: UniformBSpline) -> bool:
+    """Whether a B-spline can be sampled, and is finite, by its control points alone."""
+    points: Any = curve.points
+    if type(points) is not np.ndarray or points.dtype != np.float64 or points.ndim != 2:
         return False
-    return points.shape[0] > degree and points.shape[1] == 2 and bool(np.isfinite(points).all())
+    if not (points.shape[0] > curve.degree and points.shape[1] == 2):
+        return False
+    return _KNOTS[0] <= curve.spacing <= _KNOTS[1] and bool((np.abs(points) < _FAR).all())

@@ -13,7 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.followed import Followed, is_finite, motion_of
+from repair.check.followed import Followed, angles_along, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
     curve_excess,
@@ -123,9 +123,9 @@ class Checker:
         the vehicle stands there, from the last step on at which it does not.
         """
         first, after, path, s, slip0 = self._spliced(problem.reference, problem.t_rep, problem.t_end, curve)
-        if not is_finite(path):
+        if (angles := angles_along(self.scene.model, path, slip0)) is None:
             return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
-        slip, orientation = self.scene.model.angles(path, slip0)
+        slip, orientation = angles
         found = self._limits(curve, after, problem, path)
         if self.config.margin:
             found += boxes_entered(problem, curve, after, self.times(problem.t_end), self.config.substeps)
@@ -146,10 +146,9 @@ class Checker:
     def refuses_traffic(self, problem: RepairProblem, curve: Curve) -> Violation | None:
         """What :meth:`check` would say of the traffic alone; a curve that is not finite meets nobody."""
         first, _, path, _, slip0 = self._spliced(problem.reference, problem.t_rep, problem.t_end, curve)
-        if not is_finite(path):
+        if (angles := angles_along(self.scene.model, path, slip0)) is None:
             return None
-        _, orientation = self.scene.model.angles(path, slip0)
-        centre = path.xy.view(np.complex128)[:, 0]
+        orientation, centre = angles[1], path.xy.view(np.complex128)[:, 0]
         return self._met(centre, orientation, first, path.longest, problem.t_rep)[0]
 
     def is_free(self, reference: Curve, curve: Curve, t_end: float, *, road: bool) -> bool:

@@ -14,8 +14,9 @@ from repair.curves.plane import STANDSTILL
 
 if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
+    from repair.vehicle.model import VehicleModel
 
-__all__ = ["Followed", "is_finite", "motion_of"]
+__all__ = ["Followed", "angles_along", "is_finite", "motion_of"]
 
 
 @dataclass(frozen=True)
@@ -65,3 +66,12 @@ def is_finite(path: CartesianPath) -> bool:
     if len(path.t) > 1 and math.isfinite(path.longest + path.sharpest + path.speed.dot(path.speed)):
         return True
     return all(bool(np.isfinite(column).all()) for column in (path.xy, path.heading, path.speed))
+
+
+def angles_along(model: VehicleModel, path: CartesianPath, slip0: float | None) -> tuple[Array, Array] | None:
+    """Slip angle and orientation (K,) [rad] along a path; None where that, or one of these, is not finite."""
+    if not is_finite(path):
+        return None
+    slip, orientation = model.angles(path, slip0)
+    # Going back fast, the slip angle grows.
+    return (slip, orientation) if math.isfinite(orientation.dot(orientation)) else None

@@ -143,7 +143,9 @@ def _slip_angle(turn: Array, step: Array, length: Array, rear: float, slip0: flo
     half = quarter.copy()  # of the rotation between two straight pieces
     half[1:] += quarter[:-1]
     value = math.tan(0.5 * slip0)
-    tangents, decay = np.tan(half).tolist(), np.exp(_DECAY * ratio).tolist()
+    tangents = np.tan(half).tolist()
+    with np.errstate(over="ignore"):  # it grows for who goes back, and in one huge step beyond all numbers
+        decay = np.exp(_DECAY * ratio).tolist()
     slip = np.empty(len(step) + 1)
     slip[0] = slip0
     slip[1:] = [
