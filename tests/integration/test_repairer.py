@@ -19,6 +19,7 @@ from tests import roads
 import repair
 from repair.api import find
 from repair.backend.base import SolveResult, SolveStatus
+from repair.cycle import paced
 from repair.cycle.paced import Pace, Paced
 from repair.cycle.scenery import fits
 from repair.cycle.searching import searched
@@ -347,6 +348,18 @@ def test_searches_that_are_cut_short_do_not_say_how_long_judging_takes(scene):
     for _ in range(20):
         assert watch.update(plan(scene), deadline=60.0).search.probes
     assert watch._paces["judging"].expected == known
+
+
+def test_judging_that_once_took_too_long_is_tried_again(scene, monkeypatch):
+    monkeypatch.setattr(paced, "_AGAIN", 4)
+    watch = repair.Repairer(scene, backend="ego", overrides=["fallback=[]"])
+    watch.warm(plan(scene))
+    for _ in range(20):
+        watch._paces["judging"].took(60.0)
+    for found in (False, False, False, False, True, True):
+        cycle = watch.update(plan(scene), deadline=10.0)
+        assert (cycle.f_ttr is not None) is found
+        watch.reset()
 
 
 def test_a_part_is_not_begun_that_would_not_end_in_time():

@@ -16,7 +16,7 @@ __all__ = ["LEAST", "Pace", "Paced"]
 _KEPT = 15  # times of a part that are looked at
 LEAST = 3  #: with less of them nobody knows how long it takes
 _MORE = 1.25  # and so much longer it may take
-_AGAIN = 1500  # a part that was left out so often is tried, whatever it took: the machine may be another
+_AGAIN = 1500  # of a part that was left out so often nobody knows any more: the machine may be another
 
 
 class Pace:
@@ -29,13 +29,15 @@ class Pace:
     @property
     def expected(self) -> float:
         """[s]; 0 where nobody knows."""
-        if len(self._took) < LEAST or self._left_out >= _AGAIN:
+        if len(self._took) < LEAST:
             return 0.0
         return _MORE * sorted(self._took)[(3 * len(self._took)) // 4]
 
     def left_out(self) -> None:
         """It was not begun."""
         self._left_out += 1
+        if self._left_out >= _AGAIN:
+            self._took.clear()
 
     def took(self, seconds: float) -> None:
         """It was done."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -260,25 +261,25 @@ class Repairer:
                     held.append(verified_again(last, prepared, asked.now))
             return bool(held) and held[0] is not None
 
-        try:
-            with until(asked.at):
-                unproven = None if last is None else Unproven(max(last.due(asked.now), 0.0), verify)
-                if unproven is not None and asked.at is not None:  # what there is already comes first
-                    unproven.asked()
-                if np.isfinite(prepared.conflict.time):
-                    with phases("occupancy"):
-                        prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
-                    with phases("problem"):
-                        self._source(prepared)
-                guess, like = hints(last, asked.now, self.config.search.delta_t)
-                found = searched(
-                    prepared, self._backend, self._limited(asked), unproven, guess, thorough=True, like=like
-                )
-                # Who was cut short judged for as long as there was time, or not at all.
-                if judged := [probe.check_time for probe in found.probes if probe.solve.curve is not None]:
-                    self._paces.setdefault("judging", Pace()).took(max(judged))
-        except OutOfTime:
-            pass
+        with suppress(OutOfTime), until(asked.at):
+            unproven = None if last is None else Unproven(max(last.due(asked.now), 0.0), verify)
+            if unproven is not None and asked.at is not None:  # what there is already comes first
+                unproven.asked()
+            if np.isfinite(prepared.conflict.time):
+                with phases("occupancy"):
+                    prepared.boxes.occupancy  # noqa: B018 - to be known by that name in the times
+                with phases("problem"):
+                    self._source(prepared)
+            guess, like = hints(last, asked.now, self.config.search.delta_t)
+            found = searched(
+                prepared, self._backend, self._limited(asked), unproven, guess, thorough=True, like=like
+            )
+        # Who was cut short judged for as long as there was time, or not at all.
+        pace = self._paces.setdefault("judging", Pace())
+        if judged := [probe.check_time for probe in found.probes if probe.solve.curve is not None]:
+            pace.took(max(judged))
+        elif not found.complete:
+            pace.left_out()
         return self._answer(prepared, found, held[0] if held else None, held == [None], asked)
 
     def _source(self, prepared: Prepared) -> Any:
