@@ -362,6 +362,13 @@ def test_the_nlp_is_made_when_it_is_first_solved(monkeypatch):
     assert not build_model(other.structure(bend())).compiled
 
 
+@pytest.mark.parametrize("solver, most", [("ipopt", 200), ("sqpmethod", 80)])
+def test_each_solver_has_the_iterations_that_it_needs(solver, most):
+    for given, wanted in ((None, most), (7, 7), (1000, 1000)):
+        config = CasadiConfig(solver=solver, max_iterations=given)
+        assert CasadiBackend(config).structure(bend()).max_iterations == wanted
+
+
 def test_iteration_limit():
     config = CasadiConfig(solver="ipopt", max_iterations=1)
     result = CasadiBackend(config).solve(bend())

@@ -40,5 +40,7 @@ class CasadiConfig:
     rounds: int = setting(
         8, "solves around the own solution until the exact constraints are kept", low=1, high=100
     )
-    max_iterations: int = setting(200, "of the solver, in each round", low=1, high=100_000)
+    max_iterations: int | None = setting(
+        None, "of the solver, in each round; null: 200 of IPOPT, 80 of the SQP", low=1, high=100_000
+    )
     tolerance: float = setting(1e-8, "of the solver", low=1e-12, high=1.0)
