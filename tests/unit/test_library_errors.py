@@ -314,6 +314,25 @@ def test_a_curve_that_leads_nowhere_is_refused(far, scene, registered):
     assert result.status.value == "none_feasible"
 
 
+@pytest.mark.parametrize("behind", [0.0, 0.5])
+def test_a_curve_that_begins_otherwise_is_refused(behind, scene, registered):
+    """At the start of the scenario nothing is driven before it that it would have to go on from."""
+
+    def answer(solved, problem):
+        def stands(found):
+            still = np.zeros_like(found.position)
+            place = still + problem.start[0] - np.array([behind, 0.0])
+            return FrenetTrajectory(found.t, place, still, still, still)
+
+        return replace(solved, curve=Broken(solved.curve, stands))
+
+    registered(answer)
+    settings = [*CONSTANT, "fallback=[]", "search.upper=0"]
+    result = repair.repair(scene, overrides=settings, backend="strange")
+    (probe,) = result.search.probes
+    assert any("begins" in violation.detail for violation in probe.verdict.violations)
+
+
 def test_a_backend_that_cannot_be_made(scene):
     def factory(config):
         raise KeyError("nowhere")

@@ -13,7 +13,7 @@ import numpy as np
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, road_edge
-from repair.check.followed import Followed, angles_along, is_finite, motion_of
+from repair.check.followed import Followed, angles_along, begins_apart, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
     curve_excess,
@@ -139,7 +139,7 @@ class Checker:
         if not found and self.config.gaps == "as_reference":
             found += self._over_a_gap(problem, path, orientation)
         if not first and not found and problem.t_rep < INSTANT:
-            found += self._turned_at_start(problem, float(orientation[0]))
+            found += self._at_once(problem, after, float(orientation[0]))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
@@ -185,12 +185,13 @@ class Checker:
     ) -> tuple[int, str, tuple[float, float]] | None:
         return None if self.road is None else self.road.over_a_gap(path.xy[:, 0], path.xy[:, 1], orientation)
 
-    def _turned_at_start(self, problem: RepairProblem, orientation: float) -> list[Violation]:
-        """A repair that begins at once has to begin with the body as it stands, like the reference."""
+    def _at_once(self, problem: RepairProblem, after: FrenetTrajectory, body: float) -> list[Violation]:
+        """A repair that begins at once has to begin as the ego is, with the body as it stands."""
         kept = self._kept(problem.reference, problem.t_end)
-        turned = abs(float(wrap(orientation - kept.heading + float(kept.slip[0]))))
-        why = Violation(Reason.KINEMATICS, 0.0, f"begins turned by {turned:.3f} rad")
-        return [why] if turned > _TURNED else []
+        turned = abs(float(wrap(body - kept.heading + float(kept.slip[0]))))
+        words = f"begins turned by {turned:.3f} rad" if turned > _TURNED else ""
+        words = begins_apart(after, problem.start) or words
+        return [Violation(Reason.KINEMATICS, 0.0, words)] if words else []
 
     def take_word(self, refused: float, limits: Limits) -> None:
         """Leave the kinematics of references to CommonRoad's drivability checker, which was asked.

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from repair.curves.plane import CartesianPath
     from repair.vehicle.model import VehicleModel
 
-__all__ = ["Followed", "angles_along", "is_finite", "motion_of"]
+__all__ = ["Followed", "angles_along", "begins_apart", "is_finite", "motion_of"]
+
+_PLACE_OFF, _SPEED_OFF = 0.05, 0.2  # farther from the state that it has [m], [m/s] nobody begins
 
 
 @dataclass(frozen=True)
@@ -75,3 +77,14 @@ def angles_along(model: VehicleModel, path: CartesianPath, slip0: float | None) 
     slip, orientation = model.angles(path, slip0)
     # Going back fast, the slip angle grows.
     return (slip, orientation) if math.isfinite(orientation.dot(orientation)) else None
+
+
+def begins_apart(curve: FrenetTrajectory, start: Array) -> str:
+    """How samples of a curve miss the state (3, 2) that it has to begin in, in words; empty where not."""
+    place, speed = (
+        float(np.abs(column[0] - state).max())
+        for column, state in zip((curve.position, curve.velocity), start, strict=False)
+    )
+    if place > _PLACE_OFF:
+        return f"begins {place:.2f} m from where the vehicle is"
+    return f"begins with a speed that is off by {speed:.2f} m/s" if speed > _SPEED_OFF else ""
