@@ -14,7 +14,6 @@ from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import Config, load_config
 from repair.errors import BackendError
-from repair.problem.factory import Relaxed
 from repair.problem.problem import Maneuver, Passing
 from repair.search.result import SearchStatus
 from repair.search.rules import probe_order
@@ -734,34 +733,13 @@ def test_another_way_past_the_same_obstacles_is_asked():
     too_close = (Reason.COLLISION,)
     assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1]}) == [-0.22]
     assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1], -0.3: [2, 2, 1]}) == [-0.22, -0.3]
+    assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 2, 1], -0.3: [0, 0, 0]}) == [-0.22]
     assert asked_margins(Maneuver.YIELD, too_close, {-0.2: [0, 0, 0]}) == []
     assert asked_margins(Maneuver.LEFT, (Reason.MARGIN, Reason.LIMITS), {-0.1: [2, 2, 2]}) == ALL
     # The sides taken of others do not keep it from the one that it came too close to.
     first = {0.1: [[0, 0, 2], [0, 0, 0]]}
     assert asked_margins(Maneuver.YIELD, too_close, first | {-0.2: [[0, 2, 2], [0, 3, 3]]}) == []
     assert asked_margins(Maneuver.YIELD, too_close, first | {-0.2: [[0, 2, 1], [0, 0, 0]]}) == [-0.22]
-
-
-def test_margins_are_not_made_where_the_smallest_is_of_no_use():
-    made = []
-
-    class Counting(Relaxing):
-        def relaxed(self, t_rep):
-            return Relaxed(lambda margin: made.append(margin) or self.at(t_rep, margin), self.margins)
-
-    class Refusing:
-        def check(self, problem, curve):
-            return Verdict((Violation(Reason.COLLISION, problem.t_rep, "", 100),))
-
-    def asked(sides):
-        made.clear()
-        backend = Narrow({Maneuver.YIELD: -1.0}, {Maneuver.YIELD}, capabilities=Capabilities(relaxes=True))
-        source = Counting(-0.1, -0.2, -0.3, sides=sides)
-        search(Refusing(), source=source, backend=backend, upper=0.0)
-        return made
-
-    assert asked({}) == [-0.3]
-    assert asked({-0.3: [0, 2, 2]}) == [-0.3, -0.1, -0.2]
 
 
 def test_a_guide_that_follows_the_reference_into_what_it_meets_is_not_asked():

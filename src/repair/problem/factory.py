@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -54,39 +54,6 @@ class _Here:
         """How the speed may go on."""
         tau = self.reference.t - self.reference.t[0]
         return Bends(speed_profiles(self.start, tau, self.limits), self.limits, self.axis)
-
-
-class Relaxed(Sequence[tuple[RepairProblem, ...]]):
-    """The problems of a t_rep by margin, made as they are looked at.
-
-    Parameters
-    ----------
-    make : callable
-        The problems with a margin [m].
-    margins : sequence of float
-        [m].
-    """
-
-    def __init__(self, make: Callable[[float], tuple[RepairProblem, ...]], margins: Sequence[float]) -> None:
-        self._make, self._margins = make, margins
-        self._made: dict[float, tuple[RepairProblem, ...]] = {}
-
-    def __len__(self) -> int:
-        return len(self._margins)
-
-    @overload
-    def __getitem__(self, k: int) -> tuple[RepairProblem, ...]: ...
-
-    @overload
-    def __getitem__(self, k: slice) -> list[tuple[RepairProblem, ...]]: ...
-
-    def __getitem__(self, k: int | slice) -> tuple[RepairProblem, ...] | list[tuple[RepairProblem, ...]]:
-        if isinstance(k, slice):
-            return [self[j] for j in range(*k.indices(len(self)))]
-        margin = self._margins[k]
-        if margin not in self._made:
-            self._made[margin] = self._make(margin)
-        return self._made[margin]
 
 
 @dataclass(frozen=True)
@@ -145,9 +112,12 @@ class ProblemFactory:
         s = s0 + np.arange(-20.0, 20.0 + self.limits.v_max * self.t_end, 0.5)
         return frozen(s), frozen(self.scene.frame.curvature(s))
 
-    def relaxed(self, t_rep: float) -> Relaxed:
+    def relaxed(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
         """The problems again with smaller and smaller margins, as ``repair.relax`` lists them."""
-        return Relaxed(partial(self.at, t_rep), self.settings.relax)
+        for margin in self.settings.relax:
+            problems = self.at(t_rep, margin)
+            if problems:
+                yield problems
 
     def widened(self, t_rep: float) -> Iterator[tuple[RepairProblem, ...]]:
         """The problems again with larger and larger margins, as ``repair.widen`` lists them.

@@ -7,7 +7,7 @@ finds too close needs more room, not less. So most of the margins that ``repair.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ _Way = tuple[object, ...]
 def probe_smaller(
     probe: Probe,
     rejected: Rejected,
-    relaxed: Sequence[Sequence[RepairProblem]],
+    relaxed: Iterable[Sequence[RepairProblem]],
     ask: Callable[[Sequence[RepairProblem]], tuple[Probe, Rejected]],
     budget: Budget,
 ) -> Probe:
@@ -47,10 +47,8 @@ def probe_smaller(
         With the usual margin; the answer where none is of use.
     rejected : sequence of (RepairProblem, Probe)
         What came of its sides.
-    relaxed : sequence of sequence of RepairProblem
-        The problems with smaller and smaller margins, made as they are looked at. Where no way may pass with
-        the smallest of use, those with larger ones are not made: with less of the boxes in its way a guide
-        passes differently, if at all.
+    relaxed : iterable of sequence of RepairProblem
+        The problems with smaller and smaller margins.
     ask : callable
         Solves and checks problems of one margin: the best of them, and those that failed.
     budget : Budget
@@ -78,16 +76,11 @@ def probe_smaller(
         return not (budget.collides and _as_planned(problem))
 
     learn(rejected)
-    last: Sequence[RepairProblem] | None = None
-    for k in range(len(relaxed)):
+    for problems in relaxed:
         if budget.spent:
             budget.cut = True
             break
-        if last is None:
-            last = next((problems for problems in reversed(relaxed) if any(map(evades, problems))), ())
-        if not any(map(may_pass, last)):
-            break
-        wanted = [problem for problem in relaxed[k] if may_pass(problem) and evades(problem)]
+        wanted = [problem for problem in problems if may_pass(problem) and evades(problem)]
         if not wanted:
             continue
         again, failed = ask(wanted)

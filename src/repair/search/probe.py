@@ -39,7 +39,7 @@ class ProblemSource(Protocol):
         """Problems in the order in which they should be tried; empty where no way is open."""
         ...
 
-    def relaxed(self, t_rep: float) -> Sequence[Sequence[RepairProblem]]:
+    def relaxed(self, t_rep: float) -> Iterable[Sequence[RepairProblem]]:
         """The problems again with smaller and smaller margins, for backends that keep theirs."""
         ...
 

@@ -59,7 +59,7 @@ class AtTtr:
         around = self.factory.along(curve, kind)
         return (around, *(p for p in others if p.passing is None or p.passing.maneuver is not kind))
 
-    def relaxed(self, t_rep: float) -> Sequence[tuple[RepairProblem, ...]]:
+    def relaxed(self, t_rep: float) -> Iterable[tuple[RepairProblem, ...]]:
         """The open sides again with smaller and smaller margins."""
         return self.factory.relaxed(t_rep)
 
