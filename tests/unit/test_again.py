@@ -100,18 +100,6 @@ def test_it_ends_where_no_notch_is_left_or_none_would_help(needs, visits):
     assert len(checker.seen) == visits
 
 
-@pytest.mark.parametrize("depth, seen", [(0.0, 3), (0.5, 3), (0.7, 2), (1.1, 2), (1.3, 1), (9.0, 1)])
-def test_who_is_too_deep_in_a_box_is_not_asked_with_a_little_more_room(depth, seen):
-    """0.6 m may be added at first, 0.3 m then."""
-    checker = Demanding({Reason.MARGIN: 9.0})
-    assert searched(checker, backend=FakeBackend(depth=depth)).status is SearchStatus.NONE_FEASIBLE
-    assert len(checker.seen) == seen
-    # which says nothing of the road and the limits
-    for reason in (Reason.OFF_ROAD, Reason.LIMITS):
-        checker = Demanding({reason: 0.1})
-        assert searched(checker, backend=FakeBackend(depth=depth)).probes[0].feasible
-
-
 def test_nothing_is_asked_again_where_a_side_passes():
     checker = Demanding({})
     assert searched(checker, Tightening((Maneuver.YIELD, Maneuver.LEFT))).f_ttr == 0.0

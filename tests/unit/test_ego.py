@@ -275,7 +275,7 @@ def test_pairs_are_the_literal_ones(side):
     pairs = anchor_pairs(problem, shape.greville, shape.points, 3)
     mine = {
         (int(i), int(axis), float(sign), round(float(anchor), 9), round(float(s_f), 9))
-        for i, axis, sign, anchor, s_f, _ in zip(*pairs, strict=True)
+        for i, axis, sign, anchor, s_f in zip(*pairs, strict=True)
     }
     expected = set()
     for pair in literal.make_pairs(problem, shape.points.tolist(), 3, 0.4):
@@ -421,24 +421,16 @@ def test_lambda_c_is_doubled_as_often_as_it_takes(push):
     room, joint = 0.3, 3.0 * 0.3**2
     force = push * joint
     depth = room * (1.0 + force / joint) / 2.0  # where 6 D e - 3 D^2 is the force
-    pairs = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, room, True)))
+    pairs = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, room)))
     found = pushes(pairs, np.array([[10.0 - room + depth, 0.0]]))
     assert found == (math.ceil(math.log2(push)) if push > 1.0 else 0)
     assert force <= 2.0**found * joint + 1e-9  # with an excess of D it is out of the box
 
 
-def test_how_deep_the_curve_is_left_in_a_box_is_told():
-    wall = (toy.box((5.0, 60.0), (-20.0, 20.0)),)  # too close to stop in front of it
-    result = EgoBackend(PLAIN).solve(make_problem(Side.BEHIND, boxes=wall, lateral=False))
-    assert result.depth == pytest.approx(result.curve.points[:, 0].max() - 5.0)
-    assert result.depth > 1.0
-    assert EgoBackend().solve(toy.problem(())).depth == 0.0
-
-
 def test_nobody_doubles_where_nothing_collides_or_no_room_is_wanted():
-    none = Pairs(*(np.empty(0, dtype=np.intp) for _ in range(6)))
+    none = Pairs(*(np.empty(0, dtype=np.intp) for _ in range(5)))
     assert pushes(none, np.zeros((3, 2))) == 0
-    touching = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, 0.0, True)))
+    touching = Pairs(*(np.array([v]) for v in (0, 0, -1.0, 10.0, 0.0)))
     assert pushes(touching, np.array([[11.0, 0.0]])) == 1
 
 

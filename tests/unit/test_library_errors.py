@@ -281,7 +281,6 @@ ANSWERS = {
     "no pair of numbers": lambda answer, problem: replace(answer, curve=_spanless(answer.curve)),
     "iterations": lambda answer, problem: replace(answer, iterations="3"),
     "objective": lambda answer, problem: replace(answer, objective=None),
-    "as its depth": lambda answer, problem: replace(answer, depth="deep"),
     "residuals": lambda answer, problem: replace(answer, residuals={"a": "b"}),
     "stages": lambda answer, problem: replace(answer, stages={"a": 5}),
     "no Closest": lambda answer, problem: SolveResult(SolveStatus.INFEASIBLE, closest=answer.curve),

@@ -59,7 +59,6 @@ class FakeBackend:
     name: str = "fake"
     costs: dict[Maneuver, float] = field(default_factory=dict)
     status: SolveStatus = SolveStatus.SOLVED
-    depth: float = 0.0
     on_solve: object = None
     capabilities: Capabilities = field(default_factory=Capabilities)
     limits: list[float | None] = field(default_factory=list)
@@ -73,8 +72,7 @@ class FakeBackend:
         if self.status is not SolveStatus.SOLVED:
             return SolveResult(self.status)
         maneuver = problem.passing.maneuver if problem.passing else None
-        cost = self.costs.get(maneuver, 0.0)
-        return SolveResult(self.status, curve=toy.constant(10.0), objective=cost, depth=self.depth)
+        return SolveResult(self.status, curve=toy.constant(10.0), objective=self.costs.get(maneuver, 0.0))
 
 
 @dataclass

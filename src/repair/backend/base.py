@@ -152,9 +152,6 @@ class SolveResult:
     closest : Closest or None
         What the checker may accept where there is no ``curve`` or that one is rejected: boxes in (s, l) are
         wider than the vehicles in them.
-    depth : float
-        How deep the curve is left in boxes that it was to keep out of [m], as a soft backend sees it; 0 where
-        it does not say. Where that is far more than the room that may be added, none is.
     """
 
     status: SolveStatus
@@ -167,7 +164,6 @@ class SolveResult:
     residuals: Mapping[str, float] = field(default_factory=dict)
     stages: Mapping[str, Curve] = field(default_factory=dict)
     closest: Closest | None = None
-    depth: float = 0.0
 
 
 class RepairBackend(Protocol):

@@ -67,7 +67,7 @@ def _wrong(answer: Any, problem: RepairProblem) -> str:
         return f"the status {in_words(answer.status)}, which is no SolveStatus"
     if not isinstance(answer.iterations, Integral):
         return f"{in_words(answer.iterations)} iterations"
-    for name in ("objective", "build_time", "solve_time", "depth"):
+    for name in ("objective", "build_time", "solve_time"):
         if not isinstance(value := getattr(answer, name), Real):
             return f"{kind_of(value)} as its {name}"
     if not isinstance(answer.residuals, Mapping) or not all(

@@ -24,7 +24,7 @@ from repair.problem.lateral import LastPath, kept_path
 from repair.problem.problem import RepairProblem
 from repair.solvers.ego.cost_structure import SIZES, Sizes
 from repair.solvers.ego.minimise import Minimiser, Minimum
-from repair.solvers.ego.pairs import closest_distance, depth_of
+from repair.solvers.ego.pairs import closest_distance
 from repair.solvers.ego.settings import EgoConfig
 from repair.solvers.ego.stages import Stages
 
@@ -119,7 +119,6 @@ class EgoBackend:
             status=SolveStatus.SOLVED if converged else SolveStatus.ITERATION_LIMIT,
             curve=curves["refinement"],
             objective=refined.cost,
-            depth=depth_of(pairs, refined.points),
             iterations=deformed.iterations + refined.iterations,
             build_time=built - begin,
             solve_time=time.perf_counter() - built,

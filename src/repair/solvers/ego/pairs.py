@@ -6,11 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 
-__all__ = ["Pairs", "anchor_pairs", "closest_distance", "depth_of", "pushes"]
+__all__ = ["Pairs", "anchor_pairs", "closest_distance", "pushes"]
 
 # NumPy compares with plain integers several times faster than with an enumeration's members.
 # The sides up to this one are about s, the others about l.
@@ -34,8 +35,6 @@ class Pairs(NamedTuple):
         Coordinate of p on that axis [m].
     threshold : (P,) array
         s_f of the pair [m].
-    box : (P,) bool array
-        Whether p is on an obstacle's box; else it is on the edge of the road.
     """
 
     row: np.ndarray
@@ -43,7 +42,6 @@ class Pairs(NamedTuple):
     sign: np.ndarray
     anchor: np.ndarray
     threshold: np.ndarray
-    box: np.ndarray
 
     def along(self, axis: int) -> Pairs:
         """The pairs whose v points along an axis."""
@@ -72,7 +70,7 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
     A box that the ego passes behind or ahead of concerns the points inside its lateral interval,
     one passed on the left or right those inside its longitudinal interval.
     """
-    parts: list[Pairs] = []
+    parts: list[tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array, Array, Array]] = []
     passing = problem.passing
     if passing is not None and len(problem.occupancy):
         lower, upper = problem.occupancy.at(times[first:])
@@ -84,33 +82,25 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
         axis, sign = SIDE_AXIS.take(chosen), SIDE_SIGN.take(chosen)
         corner = 2 * found + axis
         anchor = np.where(sign > _ZERO, upper.ravel().take(corner), lower.ravel().take(corner))
-        count = len(found)
-        room, box = np.full(count, problem.clearance), np.ones(count, dtype=np.bool_)
-        parts.append(Pairs(found % len(free) + first, axis, sign, anchor, room, box))
+        parts.append((found % len(free) + first, axis, sign, anchor, np.full(len(found), problem.clearance)))
     if problem.lateral:
         right, left = problem.bounds.at(shape[first:, 0])
         row = np.arange(first, len(times))
         ones = np.ones(len(row))
-        edge, box = np.full(len(row), min(problem.clearance, 0.2)), np.zeros(len(row), dtype=np.bool_)
+        edge = np.full(len(row), min(problem.clearance, 0.2))
         for sign_value, anchor in ((1.0, right), (-1.0, left)):
-            parts.append(Pairs(row, np.ones_like(row), sign_value * ones, anchor, edge, box))
+            parts.append((row, np.ones_like(row), sign_value * ones, anchor, edge))
     if len(parts) == 1:
-        return parts[0]
+        return Pairs(*parts[0])
     if not parts:
-        none, empty = np.empty(0, dtype=np.intp), np.empty(0)
-        return Pairs(none, none, empty, empty, empty, empty.astype(np.bool_))
+        empty = np.empty(0)
+        return Pairs(empty.astype(np.intp), empty.astype(np.intp), empty, empty, empty)
     return Pairs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def closest_distance(pairs: Pairs, points: Array) -> float:
     """Smallest obstacle distance of all pairs, inf without any."""
     return float(pairs.distance(points).min()) if pairs.row.size else float("inf")
-
-
-def depth_of(pairs: Pairs, points: Array) -> float:
-    """How deep points are in the boxes that they have to keep out of [m]; 0 where none is."""
-    deep = -pairs.distance(points)[pairs.box]
-    return max(float(deep.item(deep.argmax())), 0.0) if len(deep) else 0.0
 
 
 def pushes(pairs: Pairs, points: Array) -> int:
