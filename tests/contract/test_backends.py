@@ -168,7 +168,7 @@ class _Source:
         return self.at(t_rep)
 
 
-class _Checker:
+class _Checker(toy.Judging):
     def check(self, problem, curve):
         hit = problems.clearance(problem, curve, 0.01) < 0.0
         return Verdict((Violation(Reason.COLLISION, problem.t_rep),) if hit else ())
@@ -276,7 +276,7 @@ def test_the_checker_may_accept_the_closest_curve_unless_the_problem_is_strict(s
         def relaxed(self, t_rep):
             return ()
 
-    class Lenient:
+    class Lenient(toy.Judging):
         def check(self, problem, curve):
             return Verdict()
 

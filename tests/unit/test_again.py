@@ -35,7 +35,7 @@ class Tightening(FakeSource):
 
 
 @dataclass
-class Demanding:
+class Demanding(toy.Judging):
     """Misses a reason until what answers it has been tightened by enough."""
 
     needs: dict[Reason, float]
@@ -173,7 +173,7 @@ def test_larger_margins_may_show_another_way():
         open_until=-1.0,
     )
 
-    class OnlyYield:
+    class OnlyYield(toy.Judging):
         def check(self, problem, curve):
             found = problem.passing.maneuver is Maneuver.YIELD
             return Verdict() if found else Verdict((Violation(Reason.MARGIN, 0.0),))

@@ -26,6 +26,7 @@ from repair.solvers.ego.cost_structure import SIZES, Sizes, cost_structure
 from repair.solvers.ego.minimise import Minimum, minimiser, newton
 from repair.solvers.ego.pairs import Pairs, anchor_pairs, pushes
 from repair.solvers.ego.settings import DeformWeights, EgoConfig, RefineWeights
+from repair.solvers.ego.stages import Stages
 
 # The paper's two stages and nothing else.
 PLAIN = EgoConfig(rebounds=0, guard=False)
@@ -425,6 +426,24 @@ def test_lambda_c_is_doubled_as_often_as_it_takes(push):
     found = pushes(pairs, np.array([[10.0 - room + depth, 0.0]]))
     assert found == (math.ceil(math.log2(push)) if push > 1.0 else 0)
     assert force <= 2.0**found * joint + 1e-9  # with an excess of D it is out of the box
+
+
+@pytest.mark.parametrize("at, kappa", [(3.0, 0.1), (3.0, 0.3), (6.0, 0.2)])
+def test_in_a_bend_the_rounds_go_on_until_the_speed_fits_the_places(at, kappa):
+    """With lambda_c doubled at once fewer rounds are needed for the boxes, and none fewer for the bend."""
+    s = np.linspace(0.0, 150.0, 301)
+    bends = kappa * np.exp(-(((s - at) / 4.0) ** 2))
+    wall = (toy.box((6.0, 200.0), (-20.0, 20.0)),)
+    problem = make_problem(Side.BEHIND, boxes=wall, lateral=False)
+    problem = replace(problem, curvature_s=frozen(s), curvature=frozen(bends))
+    config = EgoConfig(rebounds=3)
+    n, spacing = fitted_knots(problem.t_end, 0.4, 3)
+    initial = fit_to_curve(problem.reference, 0.0, n, 3, spacing)
+    found = Stages(config, 3).deform(problem, initial, None)
+    assert found.cap is not None
+    speeds = np.diff(found.minimum.points[:, 0]) / spacing
+    fits = (speeds <= 1.02 * bend_speed(problem, found.minimum.points)).all()
+    assert fits or found.rounds == 1 + config.rebounds
 
 
 def test_nobody_doubles_where_nothing_collides_or_no_room_is_wanted():

@@ -75,7 +75,7 @@ class Soft:
 
 
 @dataclass
-class Until:
+class Until(toy.Judging):
     latest: float
 
     def check(self, problem, curve):

@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from tests import toy
 from tests.contract import problems
 
 import repair
@@ -53,7 +54,7 @@ class Source:
         return ()
 
 
-class Checker:
+class Checker(toy.Judging):
     def check(self, problem, curve):
         return Verdict()
 

@@ -167,7 +167,7 @@ def test_the_closest_are_judged_one_after_the_other() -> None:
         def solve(self, problem, *, warm_start=None, time_limit=None):
             return result
 
-    class Judge:
+    class Judge(toy.Judging):
         def check(self, problem, curve):
             asked.append(curve)
             bad = () if curve is wanted else (Violation(Reason.UNSAFE_END, 1.0),)

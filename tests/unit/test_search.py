@@ -76,7 +76,7 @@ class FakeBackend:
 
 
 @dataclass
-class FakeChecker:
+class FakeChecker(toy.Judging):
     """Says yes where ``yes(problem)`` does."""
 
     yes: object
@@ -136,7 +136,7 @@ def test_bisect_visits_the_papers_iterates_of_scenario_1():
 def test_an_unsafe_end_of_the_first_says_nothing_of_later_ones(rule):
     """Only ends between 0.4 and 1.2 s are safe, and until 1.6 s there is a repair."""
 
-    class Ends:
+    class Ends(toy.Judging):
         def check(self, problem, curve):
             if problem.t_rep > 1.6 + 1e-9:
                 return Verdict((Violation(Reason.COLLISION, problem.t_rep),))
@@ -675,7 +675,7 @@ def test_smaller_margins_are_asked_for_where_they_may_help():
     source = Relaxing(-0.1, -0.3, -1.3, -4.0)
     source.maneuvers = (Maneuver.LEFT, Maneuver.RIGHT, Maneuver.YIELD)
 
-    class Judge:
+    class Judge(toy.Judging):
         def check(self, problem, curve):
             if problem.passing.maneuver is not Maneuver.LEFT:
                 return Verdict((Violation(Reason.COLLISION, problem.t_rep),))
@@ -699,7 +699,7 @@ def asked_margins(maneuver, reasons, sides=None, slower=5.0, contact=2.95):
     source = Relaxing(-0.1, -0.22, -0.3, sides=sides, slower=slower)
     source.maneuvers = (maneuver,)
 
-    class Refusing:
+    class Refusing(toy.Judging):
         def check(self, problem, curve):
             missed = reasons if problem.margin > -0.25 else (Reason.OFF_ROAD,)
             return Verdict(tuple(Violation(reason, problem.t_rep, "", 100) for reason in missed))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import chain, groupby
 
 import numpy as np
 
@@ -69,8 +70,8 @@ def probe_smaller(
                 enough[way] = min(enough.get(way, math.inf), known)
 
     def may_pass(problem: RepairProblem) -> bool:
-        ways = (_side(problem), *(_way(problem, obstacle) for obstacle in near))
-        return all(problem.margin <= enough.get(way, math.inf) for way in ways)
+        ways = (_way(problem, obstacle) for obstacle in near)
+        return all(problem.margin <= enough.get(way, math.inf) for way in chain((_side(problem),), ways))
 
     def evades(problem: RepairProblem) -> bool:
         return not (budget.collides and _as_planned(problem))
@@ -134,8 +135,7 @@ def _way(problem: RepairProblem, obstacle: int) -> _Way:
     maneuver, rows = problem.passing.maneuver, problem.passing.side[problem.occupancy.ids == obstacle]
     if maneuver in (Maneuver.LEFT, Maneuver.RIGHT):
         return (maneuver, obstacle, rows.tobytes())
-    changes = np.diff(rows, axis=1, prepend=-1) != 0
-    return (maneuver, obstacle, *(tuple(row[new].tolist()) for row, new in zip(rows, changes, strict=True)))
+    return (maneuver, obstacle, *(tuple(side for side, _ in groupby(row)) for row in rows.tolist()))
 
 
 def with_margin(probe: Probe, again: Probe, margin: float) -> Probe:

@@ -71,6 +71,10 @@ class TrajectoryChecker(Protocol):
         """Verdict on the reference until t_rep followed by ``curve``."""
         ...
 
+    def refuses_traffic(self, problem: RepairProblem, curve: Curve) -> Violation | None:
+        """What :meth:`check` says of the traffic, if anything."""
+        ...
+
 
 class Hopeless(Protocol):
     """Says where it is proven that nothing is feasible; an answer of no says nothing."""
@@ -221,7 +225,7 @@ def _judged(
         # What the backend says of the problem stays; but boxes are wider than vehicles, and the checker
         # may accept the curve that comes closest.
         if closest.miss <= 0.0 or not problem.strict:
-            again = checker.check(problem, closest.curve)
+            again = _verdict_on_closest(problem, closest.curve, checker)
             if again.ok:
                 margin -= closest.miss
                 detail = f"{solve.detail}; {closest.what} passes every check, with a margin of {margin:.2f} m"
@@ -231,6 +235,13 @@ def _judged(
             refused = refused or again
         closest = closest.instead
     return solve, verdict, margin, refused
+
+
+def _verdict_on_closest(problem: RepairProblem, curve: Curve, checker: TrajectoryChecker) -> Verdict:
+    """Of who yields or goes ahead the traffic is asked first: it refuses nine of ten such curves."""
+    along = problem.passing is not None and problem.passing.maneuver in (Maneuver.YIELD, Maneuver.GO_AHEAD)
+    why = checker.refuses_traffic(problem, curve) if along else None
+    return checker.check(problem, curve) if why is None else Verdict((why,))
 
 
 def better(new: Probe, old: Probe) -> bool:

@@ -24,6 +24,10 @@ class SafeEnds:
     def __init__(self, checker: Checker, ends: EndJudge) -> None:
         self.checker, self.ends = checker, ends
 
+    def refuses_traffic(self, problem: RepairProblem, curve: Curve) -> Violation | None:
+        """As the checker's: of the repair itself."""
+        return self.checker.refuses_traffic(problem, curve)
+
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
         """Verdict on ``curve`` after the reference until ``problem.t_rep``, and on its end."""
         verdict = self.checker.check(problem, curve)

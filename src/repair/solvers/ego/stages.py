@@ -102,16 +102,14 @@ class Stages:
             cap = None if straight else self._cap(problem, led)
             cost = self._deforming(problem, minimum.points, spacing, moved, collision, cap, resting, cost)
             minimum = self._whole(cost, minimum.points, deadline)
-            if not left:
-                break
             led = minimum.points
-            doublings = pushes(pairs, led)
+            doublings = min(pushes(pairs, led), left)
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
-            if not doublings and (cap is None or _slow_enough(problem, led, spacing)):
+            fits = not doublings and (cap is None or _slow_enough(problem, led, spacing))
+            if fits or rounds > config.rebounds:
                 break
-            doublings = min(doublings, left)
             collision *= 2.0**doublings
-            left -= max(doublings, 1)
+            left -= doublings
         return Deformed(minimum, pairs, cap, rounds)
 
     def refine(
