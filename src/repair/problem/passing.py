@@ -160,7 +160,7 @@ def _closest(
     shut: list[_Shut], wanted: list[Maneuver | None], bends: Bends
 ) -> dict[Maneuver, tuple[float, int, LateralProfile]]:
     """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
-    excess = bends.excess(slice(None))
+    excess = bends.of_all
     closest: dict[Maneuver | None, tuple[float, int, LateralProfile, Maneuver]] = {}
     for profile, maneuver, others, meetings in shut:
         if profile.maneuver not in wanted:

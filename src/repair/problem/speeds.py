@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -211,6 +211,11 @@ class Bends:
         # A little more than the true numbers, which are rounded in another order.
         bend = (1.0 + 1e-9) * sharpest * highest**2
         return bend <= self.lateral and (1.0 + 1e-9) * math.hypot(bend, rate) <= self.total
+
+    @cached_property
+    def of_all(self) -> Array:
+        """:meth:`excess` of every profile: one margin after the other asks for it."""
+        return frozen(self.excess(slice(None)))
 
     def excess(self, p: int | slice | npt.NDArray[np.intp]) -> Array:
         """By how much profiles ``p`` (P',) do not keep to them [m/s²]; 0 for those that do."""
