@@ -799,6 +799,31 @@ def test_the_curve_that_comes_closest_may_pass_the_checks(strict):
         assert "passes every check" in probe.solve.detail
 
 
+@pytest.mark.parametrize("maneuver", [Maneuver.YIELD, Maneuver.GO_AHEAD, Maneuver.LEFT])
+@pytest.mark.parametrize("refuses", [False, True])
+def test_of_a_closest_curve_that_keeps_the_path_the_traffic_is_asked_first(maneuver, refuses):
+    class Near(FakeBackend):
+        def solve(self, problem, *, warm_start=None, time_limit=None):
+            return SolveResult(SolveStatus.INFEASIBLE, closest=Closest(toy.constant(10.0), 0.3))
+
+    class Judge:
+        asked = ()
+
+        def refuses_traffic(self, problem, curve):
+            self.asked += ("traffic",)
+            return Violation(Reason.MARGIN, 1.0, "", 7) if refuses else None
+
+        def check(self, problem, curve):
+            self.asked += ("all",)
+            return Verdict()
+
+    judge = Judge()
+    (probe,) = search(judge, source=FakeSource((maneuver,)), backend=Near(), upper=0.0).probes
+    along = maneuver is not Maneuver.LEFT
+    assert probe.feasible == (not (along and refuses))
+    assert judge.asked == (("traffic",) if along and refuses else ("traffic", "all") if along else ("all",))
+
+
 # -- given visits --------------------------------------------------------------------------------------
 
 

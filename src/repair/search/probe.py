@@ -238,7 +238,7 @@ def _judged(
 
 
 def _verdict_on_closest(problem: RepairProblem, curve: Curve, checker: TrajectoryChecker) -> Verdict:
-    """Of who yields or goes ahead the traffic is asked first: it refuses nine of ten such curves."""
+    """Of who yields or goes ahead the traffic is asked first: it is mostly what refuses them."""
     along = problem.passing is not None and problem.passing.maneuver in (Maneuver.YIELD, Maneuver.GO_AHEAD)
     why = checker.refuses_traffic(problem, curve) if along else None
     return checker.check(problem, curve) if why is None else Verdict((why,))
