@@ -150,18 +150,21 @@ def test_small_and_large_problems_are_evaluated_alike(side, lateral, t_end, spac
     """One dense matrix below a size, the structure of the spline above it, sparse beyond another."""
     problem = make_problem(side, t_end=t_end, lateral=lateral, reference=swerving_reference(18))
     costs = []
-    for sizes in (Sizes(dense=10**9), Sizes(dense=0), Sizes(dense=0, sparse=0)):
+    small = Sizes(dense=10**9, bands=10**9)
+    for sizes in (small, Sizes(dense=0, bands=0), Sizes(dense=0, bands=0, sparse=0)):
         made = run(problem, spacing=spacing, sizes=sizes)
         costs.append((made.deformation, made.refinement))
     rng = np.random.default_rng(2)
     for dense, *others in zip(*costs, strict=True):
         assert dense.structure.dense is not None
+        assert dense.structure.bands is not None
         for metre in (0.0, 0.3, 4.0):
             u = metre * rng.normal(size=dense.size)
             one = dense(u)
             room = 1e-6 + 1e-9 * np.abs(one.gradient).max()  # where terms cancel, their rounding stays
             for cost, kind in zip(others, (np.ndarray, csr_array), strict=True):
                 assert cost.structure.dense is None
+                assert cost.structure.bands is None
                 assert isinstance(cost.structure.free, kind)
                 other = cost(u)
                 assert one.value == pytest.approx(other.value, rel=1e-9)

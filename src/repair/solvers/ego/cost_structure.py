@@ -30,11 +30,14 @@ class Sizes(NamedTuple):
     ----------
     dense : int
         Entries of that matrix up to which it is made.
+    bands : int
+        The same of the matrix that makes the Hessian's band of all curvatures.
     sparse : int
         Control points beyond which the maps of one axis are sparse: most of their entries are zeros.
     """
 
     dense: int = 6000
+    bands: int = 16000
     sparse: int = 100
 
 
@@ -65,6 +68,8 @@ class CostStructure:
         Hessian of lambda_s J_s.
     factor, where : ((3n - 6) axes, 10) array
         By which a row's curvature is added to the band, and to which of its entries.
+    bands : ((3n - 6) axes, (m axes) * (width + 1)) array or None
+        Both in one, a row's curvature to the band; None where that is too large.
     dense : (2 (3n - 6) axes, m axes) array or None
         Free coordinates to x and -x of all axes; None where that is too large.
     """
@@ -77,6 +82,7 @@ class CostStructure:
     band: Array
     factor: Array
     where: npt.NDArray[np.intp]
+    bands: Array | None
     dense: Array | None
 
 
@@ -114,7 +120,11 @@ def cost_structure(
     smooth = np.repeat([0.0, 2.0 * weight, 2.0 * weight], [(n - k) * axes for k in _ORDERS])
     size = (last - first) * axes * (width + 1)
     band = np.bincount(layout.where.ravel(), (factors * smooth[:, None]).ravel(), size)
-    dense = None
+    bands = dense = None
+    if len(smooth) * size <= sizes.bands:
+        bands = np.zeros((len(smooth), size))
+        np.add.at(bands, (np.arange(len(smooth))[:, None], layout.where), factors)
+        bands.setflags(write=False)
     if layout.dense is not None:
         x = values.take(layout.dense)
         dense = frozen(np.concatenate((x, -x)))
@@ -123,7 +133,7 @@ def cost_structure(
         from scipy.sparse import csr_array
 
         maps = tuple(csr_array(m) for m in maps)
-    return CostStructure(*maps, frozen(smooth), width, frozen(band), factors, layout.where, dense)
+    return CostStructure(*maps, frozen(smooth), width, frozen(band), factors, layout.where, bands, dense)
 
 
 class _Layout(NamedTuple):

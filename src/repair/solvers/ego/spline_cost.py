@@ -191,8 +191,9 @@ class SplineCost:
         """Band (width + 1, m * axes) of the Hessian at an evaluated point, in lower form."""
         made, rows, band = self.structure, self._rows, self._band
         curvature = point.curvature[:rows] + point.curvature[rows : 2 * rows]
-        active = curvature.nonzero()[0]
-        if len(active):
+        if made.bands is not None:
+            band = curvature.dot(made.bands) + band
+        elif len(active := curvature.nonzero()[0]):
             added = made.factor.take(active, axis=0) * curvature.take(active)[:, None]
             band = band + np.bincount(made.where.take(active, axis=0).ravel(), added.ravel(), len(band))
         if len(self._diagonal):
