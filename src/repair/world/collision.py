@@ -182,12 +182,16 @@ class CollisionWorld:
         spare, reach = ego_room(here, orientation, self._radius)
         ego, row = self._open(here, orientation, reach, ego, row, asked.margin)
         counting = self._counting(here, orientation, start, asked)
-        counted = ego >= counting[row % len(self._table.kind)]
+        begin = counting[row % len(self._table.kind)]
+        counted = ego >= begin
         near = self._closely(
             here, orientation, start, spare, ego[counted], row[counted], asked.margin, counting
         )
+        if near is None:  # who does not enter the margin where it counts touches nothing from there on
+            before = ego <= begin
+            ego, row = ego[before], row[before]
         contact = None
-        if near is not None or beside or since:  # else who never enters the margin touches nothing
+        if len(ego):
             ego, row = self._open(here, orientation, reach, ego, row, 0j)
             contact = self._closely(here, orientation, start, spare, ego, row, 0j, np.zeros_like(counting))
         return (
@@ -308,6 +312,8 @@ class CollisionWorld:
         """First contact of pairs of samples and shapes, until the samples around, by advancement."""
         half, unit, table = self._half + margin, self.dt / self.substeps, self._table
         best: _Hit | None = None
+        if not len(ego):
+            return None
         until = math.inf
         for first, after, track in table.intervals(ego, row, since, len(here) - 1):
             if (first + start) * unit >= until:  # the others begin later
