@@ -6,6 +6,7 @@ Without closed gaps the verdicts are at least as strict as those of the drivabil
 
 from __future__ import annotations
 
+import math
 from copy import copy
 from functools import cached_property, lru_cache
 from threading import Lock
@@ -34,6 +35,8 @@ _BOX = 4.0
 _MOST = 32
 # Up to so many poses are looked at one by one: boxes would cost more than they save.
 _SINGLE = 40
+# Who leaves the road mostly does so at one of the first poses that are in doubt: so many are asked first.
+_FIRST = 8
 # The corners of a box with sides (back, right, front, left).
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
 
@@ -111,12 +114,14 @@ class RoadBoundary:
         gaps = self._gaps
         if gaps is None or not len(x):
             return None
+        close = self._near_gaps(x, y)
+        if not len(close):
+            return None
         import shapely
 
-        pose, boxes = self._around(x, y, orientation)
-        close = np.arange(len(x))
+        pose, boxes = self._around(x[close], y[close], orientation[close])
         if len(boxes):
-            close = np.unique(pose[:, _meet(gaps, shapely.polygons(boxes))])
+            close = close[np.unique(pose[:, _meet(gaps, shapely.polygons(boxes))])]
         if not len(close):
             return None
         bodies = shapely.polygons(self.outline(x[close], y[close], orientation[close]))
@@ -141,6 +146,23 @@ class RoadBoundary:
         sections = shapely.union_all(outlines(self._scenario.lanelet_network, sections_alone=True))
         return _beyond(self.region, sections)
 
+    @cached_property
+    def _gap_bounds(self) -> Array:
+        """The bounds ``[x_min, y_min, x_max, y_max]`` (4, G) of each gap [m]."""
+        import shapely
+
+        return np.ascontiguousarray(shapely.bounds(shapely.get_parts(self._gaps)).T)
+
+    def _near_gaps(self, x: Array, y: Array) -> npt.NDArray[np.intp]:
+        """Which poses (K,), by index, may reach the bounds of a gap; nobody of those that are not finite."""
+        reach = abs(complex(*self._corners[0])) + self.spare
+        left, low, right, high = self._gap_bounds
+        near = (left <= np.fmax.reduce(x) + reach) & (right >= np.fmin.reduce(x) - reach)
+        near &= (low <= np.fmax.reduce(y) + reach) & (high >= np.fmin.reduce(y) - reach)
+        left, low, right, high = self._gap_bounds[:, near, None]
+        met = (left - reach <= x) & (x <= right + reach) & (low - reach <= y) & (y <= high + reach)
+        return np.asarray(np.logical_or.reduce(met, axis=0).nonzero()[0])
+
     def widened(self, by: float) -> RoadBoundary:
         """The road as it would be if every section of it reached farther by ``by`` [m] on all sides."""
         import shapely
@@ -149,6 +171,7 @@ class RoadBoundary:
         sections = self.region if gaps is None else shapely.difference(self.region, gaps)
         wider.region = shapely.buffer(self.region, by)
         shapely.prepare(wider.region)
+        wider.__dict__.pop("_gap_bounds", None)
         wider._gaps = None if gaps is None else _beyond(wider.region, shapely.buffer(sections, by))
         return wider
 
@@ -192,12 +215,19 @@ class RoadBoundary:
             Centre [m] and orientation [rad] of the ego.
         """
         unsure = np.arange(len(x))
-        if len(x) > _SINGLE:
-            unsure = np.flatnonzero(~self.surely_inside(x, y, orientation))
-        if not len(unsure):
-            return None
-        inside = self.inside(self.outline(x[unsure], y[unsure], orientation[unsure]))
-        return None if inside.all() else int(unsure[np.argmin(inside)])
+        if len(x) > 2 * _FIRST:
+            first = self._left_at(x, y, orientation, unsure[:_FIRST])
+            if first is not None:
+                return first
+            unsure = unsure[_FIRST:]
+        if len(unsure) > _SINGLE:
+            unsure = unsure[~self.surely_inside(x[unsure], y[unsure], orientation[unsure])]
+        return self._left_at(x, y, orientation, unsure)
+
+    def _left_at(self, x: Array, y: Array, orientation: Array, asked: npt.NDArray[np.intp]) -> int | None:
+        """The first of some poses, by index, that is off the road; None where there is none."""
+        inside = self.inside(self.outline(x[asked], y[asked], orientation[asked]))
+        return None if inside.all() else int(asked[np.argmin(inside)])
 
     def departure(self, x: float, y: float, orientation: float) -> tuple[str, tuple[float, float]]:
         """Where a pose that leaves the road does so, and by how much: in words, and the place [m]."""
@@ -280,8 +310,12 @@ class RoadBoundary:
         """
         cos, sin = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
         forward, left = self._corners[:, 0], self._corners[:, 1]
-        corners = (x[:, None] + cos * forward - sin * left, y[:, None] + sin * forward + cos * left)
-        return np.nan_to_num(np.stack(corners, axis=2), nan=1e12, posinf=1e12, neginf=-1e12)
+        corners = np.empty((len(x), 4, 2))
+        corners[..., 0] = x[:, None] + cos * forward - sin * left
+        corners[..., 1] = y[:, None] + sin * forward + cos * left
+        if math.isfinite(np.add.reduce(corners, axis=None)):  # a sum is cheaper than a look at each
+            return corners
+        return np.nan_to_num(corners, nan=1e12, posinf=1e12, neginf=-1e12)
 
     def official_off_road(self, x: Array, y: Array, orientation: Array) -> int | None:
         """As :meth:`first_off_road`, by the drivability checker's triangulation, built at the first call.
