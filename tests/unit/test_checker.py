@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,9 @@ from tests import roads
 
 from repair.arrays import frozen
 from repair.check.checker import Checker
-from repair.check.limits import curve_excess, plane_excess
+from repair.check.limits import _fine, curve_excess, plane_excess
 from repair.check.settings import CheckerConfig, sampled
-from repair.check.verdict import Reason
+from repair.check.verdict import Reason, Violation
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
@@ -105,6 +106,36 @@ def test_asked_for_the_traffic_alone_it_says_the_same_of_it(prepared, t_rep):
         assert next(iter(of_traffic), None) == checker.refuses_traffic(problem, curve)
         seen.add(bool(of_traffic))
     assert True in seen
+
+
+def test_where_the_road_is_left_is_worked_out_for_who_reads_it(prepared, monkeypatch):
+    problem, asked = prepared.source.at(0.0)[0], []
+    road, words = prepared.checker.road, type(prepared.checker.road).departure
+    monkeypatch.setattr(type(road), "departure", lambda *pose: asked.append(pose[1:]) or words(*pose))
+    verdicts = [prepared.checker.check(problem, curve) for curve in curves(prepared, problem, 40, 3)]
+    left = [v for verdict in verdicts for v in verdict.violations if v.reason is Reason.OFF_ROAD]
+    assert len(left) > 3
+    assert not asked
+    for found in left:
+        plain = Violation(found.reason, found.time, found.detail, None, found.place)
+        assert found.detail.startswith("the ego ")
+        assert (plain, hash(plain)) == (found, hash(found))
+        assert found != Violation(found.reason, found.time)
+        sent = pickle.loads(pickle.dumps(found))
+        assert type(sent) is Violation
+        assert sent == found
+    assert len(asked) == len(left)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_what_is_looked_at_every_millisecond_is_looked_at_once(share):
+    times = 0.4 + 0.025 * np.arange(60)
+    chosen = np.random.default_rng(1).random(59) < share
+    each = [np.linspace(begin, begin + 0.025, 26) for begin in times[:-1][chosen]]
+    wanted = np.unique(np.round(each, 6))
+    found = _fine(times, chosen)
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).max() < 1e-9
 
 
 def test_what_is_kept_of_one_reference_is_not_used_for_another(prepared):

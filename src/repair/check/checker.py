@@ -6,6 +6,7 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ from repair.check.limits import (
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
-from repair.check.verdict import Reason, Verdict, Violation, met
+from repair.check.verdict import Later, Reason, Verdict, Violation, met
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.deadline import in_time
 from repair.problem.limits import Limits
@@ -272,11 +273,15 @@ class Checker:
             found.append(obstacle)
         index = self._off_road(s, centre, orientation)
         if index is not None and self.road is not None:
-            at = centre[index]
-            words, place = self.road.departure(float(at.real), float(at.imag), float(orientation[index]))
-            words, time = words + self.scene.ending_at(place), float(path.t[index])
-            found.append(Violation(Reason.OFF_ROAD, time, words, place=place))
+            pose = centre.item(index), orientation.item(index)
+            found.append(Later(Reason.OFF_ROAD, path.t.item(index), partial(self._departure, *pose)))
         return found, contact
+
+    def _departure(self, centre: complex, orientation: float) -> tuple[str, tuple[float, float]]:
+        """Where a pose that is off the road leaves it, and by how much: in words, and the place [m]."""
+        assert self.road is not None
+        words, place = self.road.departure(centre.real, centre.imag, orientation)
+        return words + self.scene.ending_at(place), place
 
     def _met(
         self, centre: Points, orientation: Array, first: int, step: float, t_from: float

@@ -278,8 +278,12 @@ def _may_exceed(values: Array, most: Array, kinks: Array) -> npt.NDArray[np.bool
 def _fine(times: Array, chosen: Array) -> Array:
     """Times every millisecond in the chosen ones of the intervals between ``times``, ends included."""
     step = float(times[1] - times[0])
-    inner = np.linspace(0.0, step, max(1, round(step / _FINE)) + 1)
-    return np.unique((times[:-1][chosen][:, None] + inner).ravel())
+    parts = max(1, round(step / _FINE))
+    first = chosen.nonzero()[0] * parts
+    wanted = np.zeros((len(times) - 1) * parts + 1, dtype=np.bool_)
+    wanted[first[:, None] + np.arange(parts + 1)] = True
+    before, part = np.divmod(wanted.nonzero()[0], parts)
+    return np.asarray(times.take(before) + np.linspace(0.0, step, parts + 1).take(part))
 
 
 def _against(

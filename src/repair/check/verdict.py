@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from repair.world.contact import Contact
 
-__all__ = ["Conflict", "Reason", "Verdict", "Violation", "met"]
+__all__ = ["Conflict", "Later", "Reason", "Verdict", "Violation", "met"]
 
 
 class Reason(str, Enum):
@@ -59,6 +61,56 @@ class Violation:
     detail: str = ""
     obstacle_id: int | None = None
     place: tuple[float, float] | None = None
+
+
+class Later(Violation):
+    """A violation whose words and place are worked out when somebody reads them: most are never read.
+
+    Parameters
+    ----------
+    reason : Reason
+    time : float
+        When it first holds [s].
+    told : callable
+        Gives the particulars in words, and the place [m].
+    """
+
+    def __init__(
+        self, reason: Reason, time: float, told: Callable[[], tuple[str, tuple[float, float]]]
+    ) -> None:
+        for name, value in (("reason", reason), ("time", time), ("obstacle_id", None), ("_told", told)):
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def _particulars(self) -> tuple[str, tuple[float, float]]:
+        told: Callable[[], tuple[str, tuple[float, float]]] = self.__dict__["_told"]
+        return told()
+
+    @property
+    def detail(self) -> str:
+        """The particulars in words."""
+        return self._particulars[0]
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where it is [m]."""
+        return self._particulars[1]
+
+    def _plain(self) -> Violation:
+        return Violation(self.reason, self.time, self.detail, self.obstacle_id, self.place)
+
+    def __eq__(self, other: object) -> bool:
+        return self._plain() == (other._plain() if isinstance(other, Later) else other)
+
+    def __hash__(self) -> int:
+        return hash(self._plain())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _same, (self._plain(),)
+
+
+def _same(violation: Violation) -> Violation:
+    return violation
 
 
 @dataclass(frozen=True)
