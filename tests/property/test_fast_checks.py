@@ -17,6 +17,7 @@ from repair.check.peaks import peaks
 from repair.curves.bspline import UniformBSpline
 from repair.curves.plane import STANDSTILL, CartesianPath, held_headings
 from repair.scene.frame import FrenetFrame
+from repair.scene.road.gaps import Gaps
 from repair.scene.traffic.obstacle import Obstacle
 from repair.vehicle import transitions_fast
 from repair.vehicle.parameters import load_vehicle
@@ -132,8 +133,7 @@ def test_the_first_gap_that_is_crossed_is_that_of_one_pose_after_the_other(seed)
     road = ragged_road(rng)
     corner = np.column_stack((rng.uniform(0, 60, 6), rng.uniform(-6, 6, 6)))
     gaps = shapely.union_all(shapely.box(*corner.T, *(corner + rng.uniform(0.01, 1.5, (6, 2))).T))
-    shapely.prepare(gaps)
-    road.__dict__["_gaps"] = gaps
+    road.__dict__["_gaps"] = Gaps(gaps)
     x, y, heading = driven(rng, int(rng.integers(1, 90)), 3.0)
     if rng.random() < 0.2:
         x[rng.integers(len(x))] = np.nan

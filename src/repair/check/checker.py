@@ -6,14 +6,13 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repair.arrays import Array, Points, frozen, wrap
 from repair.check.boxes import boxes_entered
-from repair.check.edge import RoadEdge, road_edge
+from repair.check.edge import RoadEdge, off_road, road_edge
 from repair.check.followed import Followed, angles_along, begins_apart, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
@@ -26,7 +25,7 @@ from repair.check.limits import (
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
-from repair.check.verdict import Later, Reason, Verdict, Violation, met
+from repair.check.verdict import Reason, Verdict, Violation, met
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.deadline import in_time
 from repair.problem.limits import Limits
@@ -274,14 +273,8 @@ class Checker:
         index = self._off_road(s, centre, orientation)
         if index is not None and self.road is not None:
             pose = centre.item(index), orientation.item(index)
-            found.append(Later(Reason.OFF_ROAD, path.t.item(index), partial(self._departure, *pose)))
+            found.append(off_road(self.scene, self.road, path.t.item(index), *pose))
         return found, contact
-
-    def _departure(self, centre: complex, orientation: float) -> tuple[str, tuple[float, float]]:
-        """Where a pose that is off the road leaves it, and by how much: in words, and the place [m]."""
-        assert self.road is not None
-        words, place = self.road.departure(centre.real, centre.imag, orientation)
-        return words + self.scene.ending_at(place), place
 
     def _met(
         self, centre: Points, orientation: Array, first: int, step: float, t_from: float

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from repair.check.verdict import Later, Reason, Violation
 from repair.world.road import RoadBoundary
 from repair.world.road_corridor import RoadCorridor
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
     from repair.vehicle.parameters import Vehicle
 
-__all__ = ["RoadEdge", "road_edge"]
+__all__ = ["RoadEdge", "off_road", "road_edge"]
 
 
 @dataclass(frozen=True)
@@ -48,3 +50,28 @@ def road_edge(scene: Scene, gap: float, like: RoadEdge | None = None) -> RoadEdg
     return RoadEdge(
         boundary, RoadCorridor(boundary, scene.frame, vehicle), network, scene.frame, vehicle, gap
     )
+
+
+def off_road(scene: Scene, road: RoadBoundary, time: float, centre: complex, orientation: float) -> Violation:
+    """A pose that is off the road; where it leaves it, and by how much, is worked out when it is read.
+
+    Parameters
+    ----------
+    scene : Scene
+    road : RoadBoundary
+        Its road.
+    time : float
+        [s].
+    centre : complex
+        x + iy [m].
+    orientation : float
+        [rad].
+    """
+    return Later(Reason.OFF_ROAD, time, partial(_departure, scene, road, centre, orientation))
+
+
+def _departure(
+    scene: Scene, road: RoadBoundary, centre: complex, orientation: float
+) -> tuple[str, tuple[float, float]]:
+    words, place = road.departure(centre.real, centre.imag, orientation)
+    return words + scene.ending_at(place), place

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from copy import copy
 from functools import cached_property, lru_cache
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array
+from repair.scene.road.gaps import PREPARED, SLIVER, Gaps, beyond
 from repair.scene.road.joints import Bridge
 from repair.scene.road.sections import endless, outlines
 
@@ -24,12 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RoadBoundary", "grouping"]
 
-# A prepared geometry must not be asked by two threads at once, and shapely lets other threads run.
-_PREPARED = Lock()
 # The rectangle may come this close to the edge [m] only where the exact test says so.
 _TOUCH = 1e-6
-# What is closed and smaller than this [m²] is rounding.
-_SLIVER = 1e-5
 # Consecutive poses are put into one box over about this distance [m], and so many at most.
 _BOX = 4.0
 _MOST = 32
@@ -39,27 +35,6 @@ _SINGLE = 40
 _FIRST = 8
 # The corners of a box with sides (back, right, front, left).
 _AROUND = np.array([[2, 3], [0, 3], [0, 1], [2, 1]])
-
-
-def _meet(region: Any, polygons: npt.NDArray[np.object_]) -> npt.NDArray[np.bool_]:
-    """Which polygons meet a prepared region: safe among threads."""
-    import shapely
-
-    with _PREPARED:
-        return np.asarray(shapely.intersects(region, polygons))
-
-
-def _beyond(region: Any, sections: Any) -> Any:
-    """What of a region is in no section; None where that is rounding."""
-    import shapely
-
-    parts = shapely.get_parts(shapely.difference(region, sections))
-    parts = parts[shapely.area(parts) > _SLIVER]
-    if not len(parts):
-        return None
-    gaps = shapely.union_all(parts)
-    shapely.prepare(gaps)
-    return gaps
 
 
 class RoadBoundary:
@@ -114,21 +89,21 @@ class RoadBoundary:
         gaps = self._gaps
         if gaps is None or not len(x):
             return None
-        close = self._near_gaps(x, y)
+        close = gaps.near(x, y, abs(complex(*self._corners[0])) + self.spare)
         if not len(close):
             return None
         import shapely
 
         pose, boxes = self._around(x[close], y[close], orientation[close])
         if len(boxes):
-            close = close[np.unique(pose[:, _meet(gaps, shapely.polygons(boxes))])]
+            close = close[np.unique(pose[:, gaps.met(shapely.polygons(boxes))])]
         if not len(close):
             return None
         bodies = shapely.polygons(self.outline(x[close], y[close], orientation[close]))
-        near = _meet(gaps, bodies)
+        near = gaps.met(bodies)
         for index, body in zip(close[near].tolist(), bodies[near], strict=True):
-            part = shapely.intersection(body, gaps)
-            if (area := float(shapely.area(part))) > _SLIVER:
+            part = shapely.intersection(body, gaps.region)
+            if (area := float(shapely.area(part))) > SLIVER:
                 at = shapely.centroid(part)
                 words = (
                     f"the way crosses a gap of the map at ({at.x:.1f}, {at.y:.1f}), {area:.3f} m² under the "
@@ -139,40 +114,22 @@ class RoadBoundary:
         return None
 
     @cached_property
-    def _gaps(self) -> Any:
+    def _gaps(self) -> Gaps | None:
         """What is road here and none for the drivability checker, which has the sections alone; or None."""
         import shapely
 
         sections = shapely.union_all(outlines(self._scenario.lanelet_network, sections_alone=True))
-        return _beyond(self.region, sections)
-
-    @cached_property
-    def _gap_bounds(self) -> Array:
-        """The bounds ``[x_min, y_min, x_max, y_max]`` (4, G) of each gap [m]."""
-        import shapely
-
-        return np.ascontiguousarray(shapely.bounds(shapely.get_parts(self._gaps)).T)
-
-    def _near_gaps(self, x: Array, y: Array) -> npt.NDArray[np.intp]:
-        """Which poses (K,), by index, may reach the bounds of a gap; nobody of those that are not finite."""
-        reach = abs(complex(*self._corners[0])) + self.spare
-        left, low, right, high = self._gap_bounds
-        near = (left <= np.fmax.reduce(x) + reach) & (right >= np.fmin.reduce(x) - reach)
-        near &= (low <= np.fmax.reduce(y) + reach) & (high >= np.fmin.reduce(y) - reach)
-        left, low, right, high = self._gap_bounds[:, near, None]
-        met = (left - reach <= x) & (x <= right + reach) & (low - reach <= y) & (y <= high + reach)
-        return np.asarray(np.logical_or.reduce(met, axis=0).nonzero()[0])
+        return beyond(self.region, sections)
 
     def widened(self, by: float) -> RoadBoundary:
         """The road as it would be if every section of it reached farther by ``by`` [m] on all sides."""
         import shapely
 
         wider, gaps = copy(self), self._gaps
-        sections = self.region if gaps is None else shapely.difference(self.region, gaps)
+        sections = self.region if gaps is None else shapely.difference(self.region, gaps.region)
         wider.region = shapely.buffer(self.region, by)
         shapely.prepare(wider.region)
-        wider.__dict__.pop("_gap_bounds", None)
-        wider._gaps = None if gaps is None else _beyond(wider.region, shapely.buffer(sections, by))
+        wider._gaps = None if gaps is None else beyond(wider.region, shapely.buffer(sections, by))
         return wider
 
     def bridged(self, near: Any = None) -> list[Bridge]:
@@ -197,7 +154,7 @@ class RoadBoundary:
         found = []
         for part in shapely.get_parts(shapely.difference(self.region, self._drawn)):
             area, half = float(shapely.area(part)), 0.5 * float(shapely.length(part))
-            if area <= _SLIVER:
+            if area <= SLIVER:
                 continue
             inside = shapely.point_on_surface(part)
             width = 0.5 * (half - max(half**2 - 4.0 * area, 0.0) ** 0.5)  # of a rectangle, bent or not
@@ -252,7 +209,7 @@ class RoadBoundary:
         import shapely
 
         polygons = shapely.polygons(outlines)
-        with _PREPARED:
+        with PREPARED:
             return np.asarray(shapely.contains_properly(self.region, polygons))
 
     def surely_inside(self, x: Array, y: Array, orientation: Array) -> npt.NDArray[np.bool_]:
