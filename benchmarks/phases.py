@@ -20,10 +20,10 @@ from benchmarks.measure import Report, Row, Spread, Times, row, together
 CHECKS = {
     "path in the plane": "repair.check.checker:Checker._spliced",
     "driven states": "repair.vehicle.model:KinematicSingleTrack.angles",
-    "limits": "repair.check.checker:plane_excess",
+    "limits": "repair.check.checker:broken_limits",
     "margin check": "repair.check.checker:boxes_entered",
-    "collision check": "repair.world.collision:CollisionWorld.contact_along",
-    "road check": "repair.check.checker:Checker._off_road",
+    "collision check": "repair.check.checker:Checker._met",
+    "road check": "repair.check.edge:RoadEdge.left_at",
     "kinematic check, direct": "repair.vehicle.model:KinematicSingleTrack.first_undrivable",
     "kinematic check, drivability checker": "repair.vehicle.model:official_check",
     "rest of the check": "repair.check.checker:Checker.check",

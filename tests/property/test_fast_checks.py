@@ -295,6 +295,9 @@ def test_margin_and_contact_are_looked_for_at_once(seed):
     asked = {"margin": margin, "beside": frozenset(beside), "since": int(rng.integers(0, 5))}
     near, contact = (world.contact_along(here, heading, start, **keys) for keys in (asked, {}))
     assert world.met_along(here, heading, start, step, **asked) == (near, contact)
+    late = contact is not None and near is not None and contact.time > near.time
+    sooner = world.met_along(here, heading, start, step, **asked, fully=False)
+    assert sooner == (near, None if late else contact)
     assert world.contact_along(here, heading, start, **asked, all_pairs=True) == near
 
 

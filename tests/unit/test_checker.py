@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from tests import roads
 
+from repair import check
 from repair.arrays import frozen
 from repair.check.checker import Checker
-from repair.check.limits import _fine, curve_excess, plane_excess
+from repair.check.limits import _fine, as_violation, curve_excess, plane_excess
 from repair.check.settings import CheckerConfig, sampled
 from repair.check.verdict import Reason, Violation
 from repair.config import load_config
@@ -106,6 +107,23 @@ def test_asked_for_the_traffic_alone_it_says_the_same_of_it(prepared, t_rep):
         assert next(iter(of_traffic), None) == checker.refuses_traffic(problem, curve)
         seen.add(bool(of_traffic))
     assert True in seen
+
+
+def test_which_limits_are_broken_most_is_worked_out_for_who_reads_it(prepared, monkeypatch):
+    problem, scene, looked = prepared.source.at(0.0)[0], prepared.scene, []
+    monkeypatch.setattr(check.limits, "_fine", lambda *asked: looked.append(1) or _fine(*asked))
+    verdicts = [(curve, prepared.checker.check(problem, curve)) for curve in curves(prepared, problem, 40, 3)]
+    broken = [(c, v) for c, verdict in verdicts for v in verdict.violations if v.reason is Reason.LIMITS]
+    assert len(broken) > 5
+    before, times = len(looked), prepared.checker.times(problem.t_end)
+    for curve, found in broken:
+        limits = prepared.checker.limits
+        words = curve_excess(curve, 0.0, problem.t_end, limits, prepared.checker.config.tolerance)
+        words += plane_excess(
+            curve, curve.sample(times), scene.frame, limits, scene.vehicle, prepared.checker.config.tolerance
+        )
+        assert [found] == as_violation(words)
+    assert len(looked) > before
 
 
 def test_where_the_road_is_left_is_worked_out_for_who_reads_it(prepared, monkeypatch):

@@ -6,6 +6,7 @@ centre's path), and what is judged are those states: exactly what a solution fil
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,16 +17,15 @@ from repair.check.edge import RoadEdge, off_road, road_edge
 from repair.check.followed import Followed, angles_along, begins_apart, is_finite, motion_of
 from repair.check.limits import (
     as_violation,
-    curve_excess,
+    broken_limits,
     plane_excess,
     speed_excess,
-    surely_kept,
     vehicle_excess,
 )
 from repair.check.peaks import Peaks, peaks
 from repair.check.registry import CHECKS, Driven, violations_of
 from repair.check.settings import CheckerConfig
-from repair.check.verdict import Reason, Verdict, Violation, met
+from repair.check.verdict import Reason, Verdict, Violation, entered, met
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.deadline import in_time
 from repair.problem.limits import Limits
@@ -162,7 +162,9 @@ class Checker:
         if self.world.contact_along(centre, orientation, first, path.longest) is not None:
             return False
         late = slice(len(path.t) - len(after), None)
-        return not road or self._off_road(s[late], centre[late], orientation[late]) is None
+        if self.edge is None or not road:
+            return True
+        return self.edge.left_at(s[late], centre[late], orientation[late]) is None
 
     def _over_a_gap(self, problem: RepairProblem, path: CartesianPath, orientation: Array) -> list[Violation]:
         """A gap of the map that is no road for CommonRoad's own check, where the reference crosses none."""
@@ -212,7 +214,7 @@ class Checker:
         path, s, slip, orientation = self._follow(reference, t_end)
         if not is_finite(path):
             return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
-        found, contact = self._clear(path, s, orientation, 0, 0.0)
+        found, contact = self._clear(path, s, orientation, 0, 0.0, fully=True)
         self._touched = reference, t_end, contact
         if self.config.limits:
             found += self._reference_limits(reference, t_end)
@@ -262,48 +264,39 @@ class Checker:
         return first, after, path, motion[0], slip_at_start(self.scene, path) if first == 0 else slip0
 
     def _clear(
-        self, path: CartesianPath, s: Array, orientation: Array, first_sample: int, t_from: float
+        self, path: CartesianPath, s: Array, orientation: Array, first: int, since: float, fully: bool = False
     ) -> tuple[list[Violation], Contact | None]:
-        """First contact or margin entered, and first departure from the road; and the first contact."""
+        """What :meth:`_met` finds, and the first departure from the road; and the contact."""
         found = []
         centre = path.xy.view(np.complex128)[:, 0]
-        obstacle, contact = self._met(centre, orientation, first_sample, path.longest, t_from)
+        obstacle, contact = self._met(centre, orientation, first, path.longest, since, fully)
         if obstacle is not None:
             found.append(obstacle)
-        index = self._off_road(s, centre, orientation)
-        if index is not None and self.road is not None:
+        index = None if self.edge is None else self.edge.left_at(s, centre, orientation)
+        if self.edge is not None and index is not None:
             pose = centre.item(index), orientation.item(index)
-            found.append(off_road(self.scene, self.road, path.t.item(index), *pose))
+            found.append(off_road(self.scene, self.edge.boundary, path.t.item(index), *pose))
         return found, contact
 
     def _met(
-        self, centre: Points, orientation: Array, first: int, step: float, t_from: float
+        self, centre: Points, orientation: Array, first: int, step: float, t_from: float, fully: bool = False
     ) -> tuple[Violation | None, Contact | None]:
         """The first obstacle that is touched, or whose margin is entered from ``t_from`` on; and the contact.
 
-        A margin that the ego starts in counts once it has been left.
+        A margin that the ego starts in counts once it has been left. A contact that comes after the margin
+        is entered is looked for ``fully``, or else when somebody reads of it.
         """
-        margin = self.config.clearance
+        margin, driven = self.config.clearance, (centre, orientation, first, step)
         since = max(round(t_from / self.scene.dt * self.config.substeps) - first, 0)
-        if margin:
-            near, contact = self.world.met_along(
-                centre, orientation, first, step, margin=margin, beside=self._beside, since=since
-            )
-        else:
-            near = contact = self.world.contact_along(centre, orientation, first, step, since=since)
-        return met(near, contact, margin), contact
-
-    def _off_road(self, s: Array, centre: Points, orientation: Array) -> int | None:
-        """Index of the first pose that is not on the road; asked about are those the corridor leaves."""
-        if self.road is None or self.edge is None:
-            return None
-        held = self.edge.corridor.holds(s, centre, orientation)
-        if np.count_nonzero(held) == len(held):
-            return None
-        unsure = np.flatnonzero(~held)
-        left = centre[unsure]
-        index = self.road.first_off_road(left.real, left.imag, orientation[unsure])
-        return None if index is None else int(unsure[index])
+        if not margin:
+            contact = self.world.contact_along(*driven, since=since)
+            return met(contact, contact, margin), contact
+        near, contact = self.world.met_along(
+            *driven, margin=margin, beside=self._beside, since=since, fully=fully
+        )
+        if near is None or contact is not None or fully:
+            return met(near, contact, margin), contact
+        return entered(near, margin, partial(self.world.contact_along, *driven)), None
 
     def _limits(
         self, curve: Curve, after: FrenetTrajectory, problem: RepairProblem, path: CartesianPath
@@ -311,11 +304,10 @@ class Checker:
         """Limits that the repaired part breaks."""
         if not self.config.limits:
             return []
-        slack = self.config.tolerance
-        broken = curve_excess(curve, problem.t_rep, problem.t_end, self.limits, slack)
-        if not surely_kept(path, len(path.t) - len(after), self.limits, self.scene.vehicle):
-            broken += plane_excess(curve, after, self.scene.frame, self.limits, self.scene.vehicle, slack)
-        return as_violation(broken)
+        scene, span = self.scene, (problem.t_rep, problem.t_end)
+        return broken_limits(
+            curve, span, after, path, scene.frame, self.limits, scene.vehicle, self.config.tolerance
+        )
 
     def _reference_limits(self, reference: Curve, t_end: float) -> list[Violation]:
         """Limits of speed and acceleration that the reference breaks; its jerk is nobody's claim."""

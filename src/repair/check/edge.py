@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from repair.arrays import Array, Points
 from repair.check.verdict import Later, Reason, Violation
 from repair.world.road import RoadBoundary
 from repair.world.road_corridor import RoadCorridor
@@ -28,6 +31,22 @@ class RoadEdge:
     frame: FrenetFrame
     vehicle: Vehicle
     gap: float
+
+    def left_at(self, s: Array, centre: Points, orientation: Array) -> int | None:
+        """Index of the first pose that is not on the road; asked about are those the corridor leaves.
+
+        Parameters
+        ----------
+        s, centre, orientation
+            (K,) arrays, as in :meth:`repair.world.road_corridor.RoadCorridor.holds`.
+        """
+        held = self.corridor.holds(s, centre, orientation)
+        if np.count_nonzero(held) == len(held):
+            return None
+        unsure = np.flatnonzero(~held)
+        left = centre[unsure]
+        index = self.boundary.first_off_road(left.real, left.imag, orientation[unsure])
+        return None if index is None else int(unsure[index])
 
 
 def road_edge(scene: Scene, gap: float, like: RoadEdge | None = None) -> RoadEdge:
@@ -67,11 +86,11 @@ def off_road(scene: Scene, road: RoadBoundary, time: float, centre: complex, ori
     orientation : float
         [rad].
     """
-    return Later(Reason.OFF_ROAD, time, partial(_departure, scene, road, centre, orientation))
+    return Later(Reason.OFF_ROAD, partial(_departure, scene, road, time, centre, orientation))
 
 
 def _departure(
-    scene: Scene, road: RoadBoundary, centre: complex, orientation: float
-) -> tuple[str, tuple[float, float]]:
+    scene: Scene, road: RoadBoundary, time: float, centre: complex, orientation: float
+) -> Violation:
     words, place = road.departure(centre.real, centre.imag, orientation)
-    return words + scene.ending_at(place), place
+    return Violation(Reason.OFF_ROAD, time, words + scene.ending_at(place), place=place)

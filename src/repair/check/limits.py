@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from repair.arrays import Array, largest, smallest
-from repair.check.verdict import Reason, Violation
+from repair.check.verdict import Later, Reason, Violation
 from repair.curves.base import Curve, FrenetTrajectory
 from repair.curves.plane import CartesianPath
 from repair.problem.limits import Limits
@@ -30,6 +30,7 @@ __all__ = [
     "ROUNDING",
     "Excess",
     "as_violation",
+    "broken_limits",
     "curve_excess",
     "plane_accelerations",
     "plane_excess",
@@ -177,6 +178,8 @@ def plane_excess(
     limits: Limits,
     vehicle: Vehicle,
     tolerance: float,
+    *,
+    fully: bool = True,
 ) -> list[Excess]:
     """What breaks a limit in the plane: along and across the driven path, friction circle, engine.
 
@@ -184,11 +187,13 @@ def plane_excess(
     ----------
     samples : FrenetTrajectory
         Of the curve, equally spaced, over what is judged.
+    fully : bool
+        Also look between samples that break a limit themselves, where it may be broken more, or sooner.
     """
     if not len(samples):
         return []
     values, most, adds = _against(samples, frame, limits, vehicle, tolerance)
-    if len(samples) > 1:
+    if len(samples) > 1 and (fully or not (values > most + 2.0 * ROUNDING).any()):
         open_ = np.logical_or.reduce(_may_exceed(values, most, _kinks(frame, samples) * adds), axis=0)
         if not np.count_nonzero(open_):
             return []
@@ -302,6 +307,38 @@ def _against(
     most = np.array((-c.a_min * more, c.a_max * more, powered, c.a_lat * more, c.a_total * more))
     adds = np.array((1.0, 1.0, 1.0 / smallest(engine), 1.0, 1.0))
     return values, most[:, None], adds[:, None]
+
+
+def broken_limits(
+    curve: Curve,
+    span: tuple[float, float],
+    samples: FrenetTrajectory,
+    path: CartesianPath,
+    frame: FrenetFrame,
+    limits: Limits,
+    vehicle: Vehicle,
+    tolerance: float,
+) -> list[Violation]:
+    """Limits that a curve breaks, as one violation; by how much is worked out when somebody reads it.
+
+    Parameters
+    ----------
+    span : (float, float)
+        From when to when it is judged [s].
+    samples : FrenetTrajectory
+        Of the curve, as in :func:`plane_excess`.
+    path : CartesianPath
+        What is driven: these samples in the plane, and maybe others before them.
+    """
+    kept = surely_kept(path, len(path.t) - len(samples), limits, vehicle)
+
+    def found(fully: bool) -> list[Excess]:
+        broken = curve_excess(curve, *span, limits, tolerance)
+        if not kept and (fully or not broken):
+            broken += plane_excess(curve, samples, frame, limits, vehicle, tolerance, fully=fully)
+        return broken
+
+    return [Later(Reason.LIMITS, lambda: as_violation(found(True))[0])] if found(False) else []
 
 
 def as_violation(broken: list[Excess]) -> list[Violation]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from repair.world.contact import Contact
 
-__all__ = ["Conflict", "Later", "Reason", "Verdict", "Violation", "met"]
+__all__ = ["Conflict", "Later", "Reason", "Verdict", "Violation", "entered", "met"]
 
 
 class Reason(str, Enum):
@@ -64,49 +64,49 @@ class Violation:
 
 
 class Later(Violation):
-    """A violation whose words and place are worked out when somebody reads them: most are never read.
+    """A violation whose particulars are worked out when somebody reads them: most are never read.
 
     Parameters
     ----------
     reason : Reason
-    time : float
-        When it first holds [s].
     told : callable
-        Gives the particulars in words, and the place [m].
+        Gives the violation.
+    obstacle_id : int, optional
+        Its obstacle, which is known already.
     """
 
-    def __init__(
-        self, reason: Reason, time: float, told: Callable[[], tuple[str, tuple[float, float]]]
-    ) -> None:
-        for name, value in (("reason", reason), ("time", time), ("obstacle_id", None), ("_told", told)):
+    def __init__(self, reason: Reason, told: Callable[[], Violation], obstacle_id: int | None = None) -> None:
+        for name, value in (("reason", reason), ("obstacle_id", obstacle_id), ("_tell", told)):
             object.__setattr__(self, name, value)
 
     @cached_property
-    def _particulars(self) -> tuple[str, tuple[float, float]]:
-        told: Callable[[], tuple[str, tuple[float, float]]] = self.__dict__["_told"]
-        return told()
+    def _told(self) -> Violation:
+        tell: Callable[[], Violation] = self.__dict__["_tell"]
+        return tell()
+
+    @property
+    def time(self) -> float:
+        """When it first holds [s]."""
+        return self._told.time
 
     @property
     def detail(self) -> str:
         """The particulars in words."""
-        return self._particulars[0]
+        return self._told.detail
 
     @property
-    def place(self) -> tuple[float, float]:
-        """Where it is [m]."""
-        return self._particulars[1]
-
-    def _plain(self) -> Violation:
-        return Violation(self.reason, self.time, self.detail, self.obstacle_id, self.place)
+    def place(self) -> tuple[float, float] | None:
+        """Where it is [m], if it has a place."""
+        return self._told.place
 
     def __eq__(self, other: object) -> bool:
-        return self._plain() == (other._plain() if isinstance(other, Later) else other)
+        return self._told == (other._told if isinstance(other, Later) else other)
 
     def __hash__(self) -> int:
-        return hash(self._plain())
+        return hash(self._told)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _same, (self._plain(),)
+        return _same, (self._told,)
 
 
 def _same(violation: Violation) -> Violation:
@@ -178,6 +178,28 @@ class Conflict:
     place: tuple[float, float] | None = None
 
 
+def entered(near: Contact, margin: float, contact: Callable[[], Contact | None]) -> Violation:
+    """A margin that is entered before anything is touched; whether it is then, is for who reads it.
+
+    Parameters
+    ----------
+    near : Contact
+        First contact of the ego enlarged by the margin.
+    margin : float
+        [m].
+    contact : callable
+        Gives the first contact of the ego itself, which is later, or None.
+    """
+    return Later(Reason.MARGIN, lambda: _margin(near, contact(), margin), near.obstacle_id)
+
+
+def _margin(near: Contact, contact: Contact | None, margin: float) -> Violation:
+    detail = f"obstacle {near.obstacle_id} within {margin:g} m"
+    if contact is not None:
+        detail += f", contact with obstacle {contact.obstacle_id} at {contact.time:.2f} s"
+    return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id)
+
+
 def met(near: Contact | None, contact: Contact | None, margin: float) -> Violation | None:
     """An obstacle that is touched, or whose margin is entered: the first of both.
 
@@ -194,9 +216,4 @@ def met(near: Contact | None, contact: Contact | None, margin: float) -> Violati
         behind = " from behind" if contact.from_behind else ""
         detail = f"obstacle {contact.obstacle_id}{behind}"
         return Violation(Reason.COLLISION, contact.time, detail, contact.obstacle_id)
-    if near is None:
-        return None
-    detail = f"obstacle {near.obstacle_id} within {margin:g} m"
-    if contact is not None:
-        detail += f", contact with obstacle {contact.obstacle_id} at {contact.time:.2f} s"
-    return Violation(Reason.MARGIN, near.time, detail, near.obstacle_id)
+    return None if near is None else _margin(near, contact, margin)

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, Points
 from repair.deadline import in_time
+from repair.timegrid import INSTANT
 from repair.world.advance import first_touch
 from repair.world.contact import Contact, told
 from repair.world.table import TrackTable
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from repair.vehicle.parameters import Vehicle
 
 __all__ = ["CollisionWorld"]
+
+_FEW = 4  # pairs, of which the exact answer costs no more than the look that mostly settles them
 
 
 class _Hit(NamedTuple):
@@ -161,6 +164,7 @@ class CollisionWorld:
         margin: float,
         beside: frozenset[int] = frozenset(),
         since: int = 0,
+        fully: bool = True,
     ) -> tuple[Contact | None, Contact | None]:
         """First contact of the ego enlarged by a margin, and that of the ego itself.
 
@@ -168,6 +172,8 @@ class CollisionWorld:
         ----------
         here, orientation, start, step, margin, beside, since
             As in :meth:`contact_along`. ``beside`` and ``since`` are for the enlarged ego alone.
+        fully : bool
+            Also look for a contact that comes after that of the enlarged ego.
 
         Returns
         -------
@@ -187,13 +193,20 @@ class CollisionWorld:
         near = self._closely(
             here, orientation, start, spare, ego[counted], row[counted], asked.margin, counting
         )
-        if near is None:  # who does not enter the margin where it counts touches nothing from there on
-            before = ego <= begin
-            ego, row = ego[before], row[before]
+        # Who does not enter the margin where it counts, or not yet, touches nothing there.
+        early, until = ego <= begin, math.inf
+        if near is not None and not fully:
+            early |= (ego >= near.sample) & (ego <= near.sample + 1)
+            until = near.time + INSTANT
+        elif near is not None:
+            early |= ego >= near.sample
+        ego, row = ego[early], row[early]
         contact = None
         if len(ego):
-            ego, row = self._open(here, orientation, reach, ego, row, 0j)
-            contact = self._closely(here, orientation, start, spare, ego, row, 0j, np.zeros_like(counting))
+            if len(ego) > _FEW:
+                ego, row = self._open(here, orientation, reach, ego, row, 0j)
+            from_first = np.zeros_like(counting)
+            contact = self._closely(here, orientation, start, spare, ego, row, 0j, from_first, until)
         return (
             None if near is None else self._told(near, here, orientation),
             None if contact is None else self._told(contact, here, orientation),
@@ -307,14 +320,13 @@ class CollisionWorld:
 
     def _closely(
         self, here: Points, orientation: Array, start: int, spare: Array, ego: Index, row: Index,
-        margin: complex, since: Index,
+        margin: complex, since: Index, until: float = math.inf,
     ) -> _Hit | None:  # fmt: skip
-        """First contact of pairs of samples and shapes, until the samples around, by advancement."""
+        """First contact before a time of pairs of samples and shapes, until the samples around."""
         half, unit, table = self._half + margin, self.dt / self.substeps, self._table
         best: _Hit | None = None
         if not len(ego):
             return None
-        until = math.inf
         for first, after, track in table.intervals(ego, row, since, len(here) - 1):
             if (first + start) * unit >= until:  # the others begin later
                 break
