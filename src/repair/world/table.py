@@ -6,7 +6,7 @@ Each sample stands for the time half way to its neighbours. Columns are tracks: 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +36,6 @@ __all__ = ["TrackTable"]
 
 # Coarse tests before the exact ones reach this much farther [m]: more than any rounding.
 _SPARE = 1e-3
-_NOBODY: frozenset[int] = frozenset()
 _BLOCK = 8  # samples that are looked at together, at least
 
 
@@ -112,6 +111,7 @@ class TrackTable:
         self.slack = slack.ravel()
         # How much of the ego's way to its neighbours a sample answers for; held shapes change at a step.
         self.share = np.array([1.0, 1.0, 1.0, 0.0])[self.mode] * np.where(self.mode == MOVING, 0.5, 1.0)
+        self._held = self._holding()
         self._build_blocks(centre, radius + slack + own_radius)
 
     def _build_blocks(self, centre: Points, reach: Array) -> None:
@@ -147,7 +147,7 @@ class TrackTable:
         ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
         return ego, (ego + start) * len(self.kind) + track
 
-    def intervals(self, ego: Index, row: Index, since: Index, last: int) -> Iterator[tuple[int, int, int]]:
+    def intervals(self, ego: Index, row: Index, since: Index, last: int) -> list[tuple[int, int, int]]:
         """Pairs of a sample and a shape as the two intervals beside it, or as the instant that it is.
 
         An instant is there where no interval that ends there, or begins, holds the shape at it.
@@ -160,37 +160,39 @@ class TrackTable:
         last : int
             The last of them.
 
-        Yields
-        ------
-        (first, after, track)
+        Returns
+        -------
+        list of (first, after, track)
             The interval's samples, the same one twice for an instant; each once, in the order of time and,
             of those that begin together, of the tracks.
         """
         track = row % len(self.kind)
-        at: dict[int, set[int]] = {}
-        for k, m in zip(ego.tolist(), track.tolist(), strict=True):
-            at.setdefault(k, set()).add(m)
-        alone: dict[int, set[int]] = {}
-        only = ~self._held(ego, row, self.mode[track], since[track], last)
-        for k, m in zip(ego[only].tolist(), track[only].tolist(), strict=True):
-            alone.setdefault(k, set()).add(m)
-        counted = since.tolist()
-        for first in sorted({j for k in at for j in (k - 1, k)}):
-            pairs = [(m, first) for m in alone.get(first, _NOBODY)]
-            if first < last:
-                both = at.get(first, _NOBODY) | at.get(first + 1, _NOBODY)
-                pairs += [(m, first + 1) for m in both if first >= counted[m] and not self._instant[m]]
-            yield from ((first, after, m) for m, after in sorted(pairs))
+        begin = since.take(track)
+        ends, begins = ego > begin, ego < last
+        held = self._held.take(row, axis=1)
+        alone = ~(ends & held[0] | begins & held[1])
+        begins &= ego >= begin
+        columns = (ego, track, ends, begins, alone)
+        found: set[tuple[int, int, int]] = set()
+        for k, m, ended, begun, only in zip(*(column.tolist() for column in columns), strict=True):
+            if only:
+                found.add((k, m, k))
+            if self._instant[m]:
+                continue
+            if ended:
+                found.add((k - 1, m, k))
+            if begun:
+                found.add((k, m, k + 1))
+        return [(first, after, m) for first, m, after in sorted(found)]
 
-    def _held(self, ego: Index, row: Index, mode: Index, since: Index, last: int) -> npt.NDArray[np.bool_]:
-        """Whether an interval that ends at a sample, or begins there, holds the shape of that sample."""
-        count, most = len(self.kind), len(self.heading) - 1
-        ends, begins = ego > since, ego < last
-        held: npt.NDArray[np.bool_] = (begins & (mode == BEFORE)) | (ends & (mode == AFTER))
-        begins &= ~np.isnan(self.heading.take(np.minimum(row + count, most)))
-        ends &= ~np.isnan(self.heading.take(np.maximum(row - count, 0)))
-        held |= (mode == MOVING) & (begins | ends)
-        return held
+    def _holding(self) -> npt.NDArray[np.bool_]:
+        """Whether an interval that ends at a sample, or begins there, holds the shape there (2, rows)."""
+        there = ~np.isnan(self.heading.reshape(self.n_samples, len(self.kind)))
+        ends, begins = np.zeros((2, *there.shape), dtype=np.bool_)
+        ends[1:], begins[:-1] = there[:-1], there[1:]
+        moving = self.mode == MOVING
+        ends, begins = ends & moving | (self.mode == AFTER), begins & moving | (self.mode == BEFORE)
+        return np.array((ends, begins)).reshape(2, -1)
 
     def motion(
         self, first: int, after: int, track: int, start: int, unit: float, here: Points, orientation: Array,
