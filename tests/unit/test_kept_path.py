@@ -12,6 +12,7 @@ import repair
 from repair.curves.bspline import UniformBSpline
 from repair.preparation import among
 from repair.problem.lateral import LastPath, aside_at, kept_path, path_of
+from repair.reference.profile import SpeedProfile
 from repair.solvers.casadi.backend import CasadiBackend
 from repair.solvers.casadi.instance import lay_out
 from repair.solvers.casadi.model import build_model
@@ -135,3 +136,10 @@ def test_who_keeps_the_path_leaves_out_whom_it_never_meets(monkeypatch, seed, fa
         assert found.why == same.why
         assert np.array_equal(found.lower, same.lower)
         assert np.array_equal(found.upper, same.upper)
+
+
+def test_a_profile_along_the_axis_says_so_itself(monkeypatch):
+    profile = SpeedProfile.from_accelerations(3.0, 8.0, [1.0, 2.5], [-2.0, 1.0])
+    assert not profile.sample(np.linspace(-1.0, 5.0, 61)).position[:, 1].any()
+    monkeypatch.setattr(SpeedProfile, "sample", None)
+    assert path_of(profile, 0.5) is None

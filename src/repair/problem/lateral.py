@@ -166,6 +166,8 @@ class Path(NamedTuple):
 
 def path_of(reference: Curve, since: float) -> Path | None:
     """The path of a reference from a time [s] on; None where it is the axis itself."""
+    if getattr(reference, "along_axis", False):  # it says so itself
+        return None
     count = max(int((reference.t_end - since) / _FINE), 2)
     path = reference.sample(since + _FINE * np.arange(count + 1)).position
     if not np.count_nonzero(path[:, 1]):
@@ -232,13 +234,14 @@ def kept_path(
     path_of : callable
         As in :func:`aside_at`.
     """
+    path = path_of(problem.reference, problem.t_rep - degree * spacing)
+    if path is None:
+        return points
     share = (degree + 1) / 24.0
     s = points[:, 0].copy()
     step = s[1:] - s[:-1]
     s[1:-1] += share * (step[1:] - step[:-1])  # where the curve is when each point acts
-    aside = aside_at(problem, s, degree * spacing, path_of)
-    if aside is None:
-        return points
+    aside = np.interp(s, path.s, path.l)
     rise = np.empty(len(aside))
     rise[:-1] = aside[1:] - aside[:-1]
     rise[-1] = (2.0 * aside[-1] - aside[-2]) - aside[-1]  # it goes on as it ends

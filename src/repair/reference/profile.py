@@ -37,6 +37,8 @@ class SpeedProfile:
     v: Array
     a: Array
 
+    along_axis = True  #: l = 0 at all times: who keeps its path keeps the axis
+
     @property
     def t_start(self) -> float:
         """Start of the span [s]."""
@@ -62,15 +64,10 @@ class SpeedProfile:
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Evaluate; jerk is zero inside of the pieces, which is all a piecewise constant can say."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        k = np.clip(np.searchsorted(self.knots, times + 1e-9, side="right") - 1, 0, len(self.knots) - 1)
-        tau = times - self.knots[k]
-        zero = np.zeros_like(tau)
-        s = self.s[k] + self.v[k] * tau + 0.5 * self.a[k] * tau**2
-        v = self.v[k] + self.a[k] * tau
-        return FrenetTrajectory(
-            times,
-            np.column_stack([s, zero]),
-            np.column_stack([v, zero]),
-            np.column_stack([self.a[k], zero]),
-            np.zeros((len(tau), 2)),
-        )
+        k = np.maximum(self.knots.searchsorted(times + 1e-9, side="right") - 1, 0)
+        tau, v, a = times - self.knots.take(k), self.v.take(k), self.a.take(k)
+        columns = np.zeros((4, len(times), 2))
+        columns[0, :, 0] = self.s.take(k) + v * tau + 0.5 * a * tau**2
+        columns[1, :, 0] = v + a * tau
+        columns[2, :, 0] = a
+        return FrenetTrajectory(times, *columns)
