@@ -65,10 +65,11 @@ def _wrong(answer: Any, problem: RepairProblem) -> str:
         return f"{kind_of(answer)}, no SolveResult"
     if not isinstance(answer.status, SolveStatus):
         return f"the status {in_words(answer.status)}, which is no SolveStatus"
-    if not isinstance(answer.iterations, Integral):
+    if type(answer.iterations) is not int and not isinstance(answer.iterations, Integral):
         return f"{in_words(answer.iterations)} iterations"
     for name in ("objective", "build_time", "solve_time"):
-        if not isinstance(value := getattr(answer, name), Real):
+        value = getattr(answer, name)
+        if type(value) is not float and not isinstance(value, Real):
             return f"{kind_of(value)} as its {name}"
     if not isinstance(answer.residuals, Mapping) or not all(
         isinstance(v, Real) for v in answer.residuals.values()
