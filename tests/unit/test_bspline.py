@@ -262,3 +262,16 @@ def test_fit_does_not_alias_its_caches():
 )
 def test_number_of_control_points_covers_the_duration(duration, spacing, segments):
     assert n_points_for(duration, spacing, 3) == segments + 3
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_speeds_are_within_the_bounds_by_control_points_alone(degree):
+    spline = random_spline(degree, seed=7)
+    slowest, fastest = spline.speed_bounds()
+    speed = spline.sample(np.linspace(spline.t_start, spline.t_end, 400)).velocity[:, 0]
+    assert slowest <= speed.min() < speed.max() <= fastest
+    assert (slowest, fastest) == pytest.approx(
+        (spline.derivative_points(1)[:, 0].min(), spline.derivative_points(1)[:, 0].max())
+    )
+    _, low, high = spline.speed_hulls()
+    assert slowest - 1e-9 <= low.min() <= high.max() <= fastest + 1e-9

@@ -12,13 +12,14 @@ from tests import roads
 from repair import check
 from repair.arrays import frozen
 from repair.check.checker import Checker
-from repair.check.limits import _fine, as_violation, curve_excess, plane_excess
+from repair.check.limits import as_violation, curve_excess, plane_excess
 from repair.check.settings import CheckerConfig, sampled
 from repair.check.verdict import Reason, Violation
 from repair.config import load_config
 from repair.curves.base import SplicedCurve
 from repair.curves.bspline import UniformBSpline
 from repair.curves.fitting import fit_to_curve
+from repair.curves.sampling import finer
 from repair.preparation import prepare
 from repair.scene.commonroad import load_scene
 from repair.world.occupancy import first_entry
@@ -111,7 +112,7 @@ def test_asked_for_the_traffic_alone_it_says_the_same_of_it(prepared, t_rep):
 
 def test_which_limits_are_broken_most_is_worked_out_for_who_reads_it(prepared, monkeypatch):
     problem, scene, looked = prepared.source.at(0.0)[0], prepared.scene, []
-    monkeypatch.setattr(check.limits, "_fine", lambda *asked: looked.append(1) or _fine(*asked))
+    monkeypatch.setattr(check.limits, "finer", lambda *asked: looked.append(1) or finer(*asked))
     verdicts = [(curve, prepared.checker.check(problem, curve)) for curve in curves(prepared, problem, 40, 3)]
     broken = [(c, v) for c, verdict in verdicts for v in verdict.violations if v.reason is Reason.LIMITS]
     assert len(broken) > 5
@@ -151,7 +152,7 @@ def test_what_is_looked_at_every_millisecond_is_looked_at_once(share):
     chosen = np.random.default_rng(1).random(59) < share
     each = [np.linspace(begin, begin + 0.025, 26) for begin in times[:-1][chosen]]
     wanted = np.unique(np.round(each, 6))
-    found = _fine(times, chosen)
+    found = finer(times, chosen, 1e-3)
     assert found.shape == wanted.shape
     assert np.abs(found - wanted).max() < 1e-9
 

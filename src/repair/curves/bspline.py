@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, frozen
+from repair.arrays import Array, frozen, largest, smallest
 from repair.curves.base import FrenetTrajectory
 from repair.curves.bases import basis_matrix, bernstein_matrix, local_basis
 from repair.curves.hulls import speed_hulls
@@ -167,6 +167,11 @@ class UniformBSpline:
         windows = self.points[:, 0].take(_segment_places(len(self.points), self.degree))
         points = windows @ bernstein_matrix(self.degree).T
         return speed_hulls(points, self.t_start, self.spacing, cuts)
+
+    def speed_bounds(self) -> tuple[float, float]:
+        """Bounds of s' over all of the curve, by the control points of the derivative alone [m/s]."""
+        ways = self.points[1:, 0] - self.points[:-1, 0]
+        return smallest(ways) / self.spacing, largest(ways) / self.spacing
 
     def sample(self, t: npt.ArrayLike) -> FrenetTrajectory:
         """Position and three derivatives at the times ``t`` [s]; beyond the span the end speed is held."""

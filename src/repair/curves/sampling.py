@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from repair.arrays import Array, frozen
 from repair.timegrid import INSTANT
 
-__all__ = ["DENSE", "KEPT", "evaluated", "hold_ends"]
+__all__ = ["DENSE", "KEPT", "evaluated", "finer", "hold_ends"]
 
 
 KEPT = 2000  #: times up to which the matrix that samples a curve at them is kept: less than 1 MB each
@@ -55,3 +56,22 @@ def evaluated(matrix: Any, points: Array) -> Array:
     if isinstance(matrix, np.ndarray):  # by columns: two long products, and s and l lie in one piece each
         return np.asarray((points.T @ matrix).reshape(points.shape[1], 4, -1).transpose(1, 2, 0))
     return np.asarray((matrix @ points).reshape(4, -1, points.shape[1]))
+
+
+def finer(times: Array, chosen: npt.NDArray[np.bool_], step: float) -> Array:
+    """Times every so often in chosen ones of equal intervals, their ends included, each once.
+
+    Parameters
+    ----------
+    times : (K,) array
+        The intervals' ends [s].
+    chosen : (K - 1,) bool array
+    step : float
+        How often at least [s], but for a rounding.
+    """
+    whole = float(times[1] - times[0])
+    parts = max(1, round(whole / step))
+    wanted = np.zeros((len(times) - 1) * parts + 1, dtype=np.bool_)
+    wanted[chosen.nonzero()[0][:, None] * parts + np.arange(parts + 1)] = True
+    before, part = np.divmod(wanted.nonzero()[0], parts)
+    return np.asarray(times.take(before) + np.linspace(0.0, whole, parts + 1).take(part))
