@@ -378,6 +378,8 @@ def test_gentle_driving_is_well_within_the_limits():
     limits = SimpleNamespace(v_max=20.0, a_min=-5.0, a_max=5.0, a_lat=5.0, a_total=5.0)
     assert surely_kept(path, 0, limits, EGO)
     assert surely_kept(path, 30, limits, EGO)
+    assert surely_kept(path._replace(slowest=-1e-13), 30, limits, EGO)
+    assert not surely_kept(path._replace(slowest=-0.1), 30, limits, EGO)
     for bad in (np.nan, 30.0):
         path.speed[40] = bad
         assert not surely_kept(path, 30, limits, EGO)

@@ -82,7 +82,7 @@ def surely_kept(path: CartesianPath, late: int, limits: Limits, vehicle: Vehicle
     a_low, a_high = (smallest(change) - swing_most) * rate, (largest(change) + swing_most) * rate
     lateral = 1.25 * max(-path.slowest, v_high) * path.sharpest * rate
     return (
-        path.slowest >= 0.0
+        path.slowest >= -ROUNDING  # who stands goes back by rounding errors
         and v_high <= limits.v_max
         and a_low >= limits.a_min
         and a_high <= min(limits.a_max, float(vehicle.engine_acceleration(v_high)))
