@@ -49,7 +49,10 @@ class Followed:
 
         A path that begins at rest does not say how the body stands.
         """
-        rates = self.motion[2, : step * substeps + 1 : substeps]
+        last = step * substeps
+        if abs(self.motion.item(2, last)) > 2.0 * STANDSTILL:
+            return last
+        rates = self.motion[2, : last + 1 : substeps]
         moving = np.flatnonzero(np.abs(rates) > 2.0 * STANDSTILL)
         return int(moving[-1]) * substeps if len(moving) else 0
 

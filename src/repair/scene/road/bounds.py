@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,15 @@ class LateralBounds:
 
     def at(self, s: npt.ArrayLike) -> tuple[Array, Array]:
         """Right and left bound at ``s`` (any shape), linear in between, constant beyond the ends."""
-        query = np.asarray(s, dtype=np.float64)
-        return np.interp(query, self.s, self.right), np.interp(query, self.s, self.left)
+        both = np.interp(np.asarray(s, dtype=np.float64), self.s, self._both)
+        return both.real, both.imag
+
+    @cached_property
+    def _both(self) -> npt.NDArray[np.complex128]:
+        """Both sides at once, as the parts of complex numbers."""
+        both = np.empty(len(self.s), dtype=np.complex128)
+        both.real, both.imag = self.right, self.left
+        return both
 
     def narrowed(self, by: float) -> LateralBounds:
         """The same with ``by`` [m] less on both sides; the path (l = 0) stays allowed."""

@@ -44,6 +44,8 @@ class Gaps:
         left, low, right, high = self.bounds
         about = (left <= np.fmax.reduce(x) + reach) & (right >= np.fmin.reduce(x) - reach)
         about &= (low <= np.fmax.reduce(y) + reach) & (high >= np.fmin.reduce(y) - reach)
+        if not np.count_nonzero(about):
+            return np.asarray(about.nonzero()[0])
         left, low, right, high = self.bounds[:, about, None]
         met = (left - reach <= x) & (x <= right + reach) & (low - reach <= y) & (y <= high + reach)
         return np.asarray(np.logical_or.reduce(met, axis=0).nonzero()[0])

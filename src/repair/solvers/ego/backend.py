@@ -100,9 +100,8 @@ class EgoBackend:
         try:
             deformed, pairs, cap, rounds = self.stages.deform(problem, initial, deadline)
             refined = self.stages.refine(problem, deformed, spacing, cap, deadline)
-            if self.config.guard and closest_distance(pairs, refined.points) < min(
-                0.0, closest_distance(pairs, deformed.points)
-            ):
+            near = closest_distance(pairs, refined.points) if self.config.guard else 0.0
+            if near < 0.0 and near < closest_distance(pairs, deformed.points):
                 refined = deformed
         except OutOfTime:
             now = time.perf_counter()

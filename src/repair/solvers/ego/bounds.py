@@ -43,7 +43,8 @@ def _both_axes(n: int, limits: Limits, config: tuple[float, ...], scale: float) 
 
 def with_pairs(bounds: SoftBounds, pairs: Pairs, collision: float) -> SoftBounds:
     """The bounds, and for each pair that of -Q . v: from d = s_f on the penalty j_c starts."""
-    weight = np.full(len(pairs.row), 6.0 * collision)
+    weight = np.empty(len(pairs.row))
+    weight.fill(6.0 * collision)
     return SoftBounds(
         np.concatenate((bounds.limit, -pairs.sign * pairs.anchor - pairs.threshold)),
         np.concatenate((bounds.joint, pairs.threshold)),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array
+from repair.arrays import Array, smallest
 from repair.problem.problem import SIDE_AXIS, SIDE_SIGN, RepairProblem, Side
 
 __all__ = ["Pairs", "anchor_pairs", "closest_distance", "pushes"]
@@ -100,7 +100,7 @@ def anchor_pairs(problem: RepairProblem, times: Array, shape: Array, first: int)
 
 def closest_distance(pairs: Pairs, points: Array) -> float:
     """Smallest obstacle distance of all pairs, inf without any."""
-    return float(pairs.distance(points).min()) if pairs.row.size else float("inf")
+    return smallest(pairs.distance(points)) if pairs.row.size else math.inf
 
 
 def pushes(pairs: Pairs, points: Array) -> int:
@@ -117,10 +117,12 @@ def pushes(pairs: Pairs, points: Array) -> int:
         0 where none collides.
     """
     distance = pairs.distance(points)
-    if not len(distance) or distance.item(distance.argmin()) >= 0.0:
+    if not len(distance) or smallest(distance) >= 0.0:
         return 0
-    collides = distance < _ZERO
-    threshold = pairs.threshold[collides]
-    if not threshold.all():
-        return 1
-    return max(math.ceil(math.log2(1.0 - 2.0 * float((distance[collides] / threshold).min()))), 1)
+    threshold = pairs.threshold
+    if np.count_nonzero(threshold) < len(threshold):
+        collides = distance < _ZERO
+        distance, threshold = distance[collides], threshold[collides]
+        if not threshold.all():
+            return 1
+    return max(math.ceil(math.log2(1.0 - 2.0 * smallest(distance / threshold))), 1)

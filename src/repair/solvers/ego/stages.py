@@ -103,7 +103,7 @@ class Stages:
             cost = self._deforming(problem, minimum.points, spacing, moved, collision, cap, resting, cost)
             minimum = self._whole(cost, minimum.points, deadline)
             led = minimum.points
-            doublings = min(pushes(pairs, led), left)
+            doublings = min(pushes(pairs, led), left) if left else 0
             # The speed limit of a bend was taken where the guide is; see whether it holds here.
             fits = not doublings and (cap is None or _slow_enough(problem, led, spacing))
             if fits or rounds > config.rebounds:
