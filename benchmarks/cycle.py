@@ -36,7 +36,7 @@ PLAIN = ("fallback=[]",)
 BACKENDS: dict[str, tuple[str, ...]] = {
     "ego": PLAIN,
     "casadi": (*PLAIN, "casadi.solver=sqpmethod"),
-    "casadi alone": (*PLAIN, "casadi.solver=sqpmethod", "casadi.helpers=[]"),
+    "casadi helped": (*PLAIN, "casadi.solver=sqpmethod", "casadi.helpers=[ego,shooting]"),
     "casadi strict": (*PLAIN, "casadi.solver=sqpmethod", "repair.relax=[]"),
     "qptr": PLAIN,
 }
@@ -223,7 +223,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.cycle", description=__doc__.splitlines()[0])
     parser.add_argument("--cycles", type=int, default=10_000)
     parser.add_argument("--rebuilds", type=int, default=100, help="rebuilt among them, of each version")
-    parser.add_argument("--backend", nargs="+", default=["ego", "casadi alone"], choices=list(BACKENDS))
+    parser.add_argument("--backend", nargs="+", default=["ego", "casadi"], choices=list(BACKENDS))
     parser.add_argument("--before", metavar="COMMIT", help="an earlier version that is rebuilt with, too")
     parser.add_argument("--deadline", type=float, nargs="+", metavar="SECONDS")
     arguments = parser.parse_args()

@@ -12,6 +12,7 @@ from repair.backend.base import Capabilities, Closest, SolveResult, SolveStatus
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import load_config
 from repair.curves.fitting import fit_to_curve
+from repair.cycle.ready import configured, made_ready
 from repair.deadline import OutOfTime
 from repair.errors import RepairError
 from repair.problem.problem import Maneuver
@@ -191,6 +192,20 @@ def test_the_registry_makes_the_helper_once_and_when_it_is_asked_for():
     assert backend.capabilities.helpers["shooting"]() is helper
     assert CasadiBackend.capabilities.helpers == {}
     assert make_backend("ego", load_config()).capabilities.helpers == {}
+
+
+def test_in_cycles_nobody_helps_who_is_not_named():
+    """One of them takes longer than a planner's cycle."""
+
+    def helping(*overrides):
+        keys = {"backend": "casadi", "overrides": [*overrides, "fallback=[]", "shooting.seed=4"]}
+        config = configured(None, keys)
+        assert load_config(**keys).casadi.helpers == (None if not overrides else config.casadi.helpers)
+        return list(made_ready(config).capabilities.helpers), [key for key, *_ in config.without_effect()]
+
+    assert helping() == ([], ["shooting.seed"])
+    assert helping("casadi.helpers=[ego]") == (["ego"], ["shooting.seed"])
+    assert helping("casadi.helpers=[shooting]") == (["shooting"], [])
 
 
 def test_who_helps_is_a_key():

@@ -242,6 +242,8 @@ class BackendSpec:
     helpers : tuple of str, or str
         Names of the backends that :attr:`Capabilities.helpers` make; or the field of its settings that lists
         them.
+    usual_helpers : tuple of str
+        Who they are where that field is null. In the cycles of a :class:`repair.Repairer` it is nobody then.
     fallbacks : tuple of str
         Names of the backends that :attr:`Capabilities.fallbacks` makes where nobody says otherwise.
     members : str
@@ -253,5 +255,6 @@ class BackendSpec:
     needs: tuple[str, ...] = ()
     says: str = "registered by the program"
     helpers: tuple[str, ...] | str = ()
+    usual_helpers: tuple[str, ...] = ()
     fallbacks: tuple[str, ...] = ()
     members: str = ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import fields, replace
 from typing import Any
 
 from repair.api import make
@@ -11,6 +12,7 @@ from repair.backend.base import RepairBackend
 from repair.config.load import load_config
 from repair.config.schema import Config, require_types, wanted_beside
 from repair.errors import BackendError, ConfigError, kind_of
+from repair.solvers.registry import BACKENDS
 from repair.vehicle.commonroad_ks import load_official
 
 __all__ = ["configured", "made_ready", "not_asked"]
@@ -23,6 +25,11 @@ def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
     ------
     ConfigError
         If it is both, none, or no search for the F-TTR.
+
+    Returns
+    -------
+    Config
+        As it is in cycles.
     """
     if config is not None and keys:
         raise ConfigError("give either a config or configuration keys, not both")
@@ -32,7 +39,21 @@ def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
     if config.driver != "f_ttr":
         raise ConfigError(f"a Repairer searches for the F-TTR; driver={config.driver} has no effect here")
     require_types(config)
-    return config
+    return _of_cycles(config)
+
+
+def _of_cycles(config: Config) -> Config:
+    """No helpers where none are named: they are there for late times, and one takes longer than a cycle has."""
+    there = {item.name for item in fields(config)}  # not those that were registered after it was made
+    asking = {name: spec.helpers for name, spec in BACKENDS.items() if isinstance(spec.helpers, str)}
+    sections = {
+        name: replace(config.section(name), **{key: []})
+        for name, key in asking.items()
+        if name in there and getattr(config.section(name), key) is None
+    }
+    made = replace(config, **sections)
+    made.given = config.given
+    return made
 
 
 def not_asked(config: Config) -> tuple[str, ...]:

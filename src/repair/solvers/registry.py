@@ -68,6 +68,7 @@ BACKENDS: Registry[BackendSpec] = Registry(
             ("casadi",),
             "the same spline as an NLP with hard convex-hull constraints (IPOPT or SQP)",
             helpers="helpers",
+            usual_helpers=("ego", "shooting"),
             fallbacks=("ego", "qptr", "shooting"),
         ),
         "qptr": BackendSpec(
@@ -202,7 +203,8 @@ def helpers_of(name: str, config: Configuration) -> list[str]:
     spec = BACKENDS[name]
     if not isinstance(spec.helpers, str):
         return list(spec.helpers)
-    named = list(dict.fromkeys(getattr(config.section(name), spec.helpers)))
+    listed = getattr(config.section(name), spec.helpers)
+    named = list(dict.fromkeys(spec.usual_helpers if listed is None else listed))
     for each in named:
         if each == name or BACKENDS[each].members:
             why = "it cannot help itself" if each == name else "it is made of several backends"

@@ -14,10 +14,10 @@ class CasadiConfig:
     """The hard-constraint NLP."""
 
     solver: str = setting("ipopt", "CasADi's solver of the NLP", choices=("ipopt", "sqpmethod"))
-    helpers: list[str] = setting(
-        factory=lambda: ["ego", "shooting"],
-        says="backends that are asked for a curve to start from where it finds nothing; [] is faster, and "
-        "some F-TTR are earlier",
+    helpers: list[str] | None = setting(
+        None,
+        "backends that are asked for a curve to start from where it finds nothing; null: ego and shooting, "
+        "in the cycles of a Repairer nobody; [] is faster, and some F-TTR are earlier",
         registry="backend",
     )
     obstacles: str = setting(
