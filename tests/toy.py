@@ -78,3 +78,6 @@ class Judging:
 
     def refuses_traffic(self, problem, curve):
         return None
+
+    def blocked(self, problem):
+        return None

@@ -80,6 +80,8 @@ class Capabilities:
     own_way : bool
         It finds its own way past the obstacles: it is asked once for each t_rep, with all the room there is,
         without a guide (``problem.passing`` is None), and with the true shapes (``problem.shapes``).
+    keeps_path : bool
+        Where a problem is not ``lateral``, its curves stay on the path of the reference, to some centimetres.
     jumps : bool
         The acceleration of its curves may jump, at t_rep too, as an input of the vehicle's model may.
     helpers : mapping of str to callable
@@ -96,6 +98,7 @@ class Capabilities:
     keeps_hull: bool = False
     uses_warm_start: bool = False
     own_way: bool = False
+    keeps_path: bool = False
     jumps: bool = False
     helpers: Mapping[str, Callable[[], RepairBackend]] = field(default_factory=dict)
     members: Callable[[], Mapping[str, RepairBackend]] | None = None

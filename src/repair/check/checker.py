@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from repair.arrays import Array, Points, frozen, wrap
+from repair.arrays import Array, Points, frozen
 from repair.check.boxes import boxes_entered
 from repair.check.edge import RoadEdge, off_road, road_edge
-from repair.check.followed import Followed, angles_along, begins_apart, is_finite, motion_of
+from repair.check.followed import Followed, angles_along, is_finite, met_anyhow, motion_of
 from repair.check.limits import (
     as_violation,
     broken_limits,
@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from repair.scene.scene import Scene
 
 __all__ = ["Checker"]
-
-_TURNED = 0.01  # a repair may begin turned off the reference by this [rad]
 
 
 class Checker:
@@ -139,7 +137,9 @@ class Checker:
         if not found and self.config.gaps == "as_reference":
             found += self._over_a_gap(problem, path, orientation)
         if not first and not found and problem.t_rep < INSTANT:
-            found += self._at_once(problem, after, float(orientation[0]))
+            kept = self._kept(problem.reference, problem.t_end)
+            if words := kept.begun_otherwise(after, problem.start, float(orientation[0])):
+                found.append(Violation(Reason.KINEMATICS, 0.0, words))
         # What is rejected already is not worth the drivability checker's time.
         return Verdict(tuple(found or self._kinematics(path, slip, orientation)))
 
@@ -150,6 +150,15 @@ class Checker:
             return None
         orientation, centre = angles[1], path.xy.view(np.complex128)[:, 0]
         return self._met(centre, orientation, first, path.longest, problem.t_rep)[0]
+
+    def blocked(self, problem: RepairProblem) -> Violation | None:
+        """Whom each repair meets that keeps to the path of the reference, whatever its speed; if anybody."""
+        if not self.config.limits:  # which bound where it may be
+            return None
+        kept = self._kept(problem.reference, problem.t_end)
+        margin = 0.0 if self._beside else self.config.clearance  # else it counts once it has been left
+        limits = self.limits.reserving(-self.config.tolerance)
+        return met_anyhow(kept, self.world, limits, margin, problem.t_rep, problem.t_end)
 
     def is_free(self, reference: Curve, curve: Curve, t_end: float, *, road: bool) -> bool:
         """Whether a curve after the reference touches nobody, nor leaves the road where that is asked.
@@ -177,23 +186,13 @@ class Checker:
     def _crosses(self, followed: Followed) -> bool:
         """Whether the reference crosses a gap; asked only where a repair does."""
         if (known := self._crossing) is None or known[0] is not followed:
-            path = self.scene.frame.carry(self.times(followed.t_end), followed.motion)
-            turned = self.scene.model.angles(path, float(followed.slip[0]))[1]
-            known = self._crossing = followed, self._gap_under(path, turned) is not None
+            known = self._crossing = followed, self._gap_under(followed.path, followed.turned) is not None
         return known[1]
 
     def _gap_under(
         self, path: CartesianPath, orientation: Array
     ) -> tuple[int, str, tuple[float, float]] | None:
         return None if self.road is None else self.road.over_a_gap(path.xy[:, 0], path.xy[:, 1], orientation)
-
-    def _at_once(self, problem: RepairProblem, after: FrenetTrajectory, body: float) -> list[Violation]:
-        """A repair that begins at once has to begin as the ego is, with the body as it stands."""
-        kept = self._kept(problem.reference, problem.t_end)
-        turned = abs(float(wrap(body - kept.heading + float(kept.slip[0]))))
-        words = f"begins turned by {turned:.3f} rad" if turned > _TURNED else ""
-        words = begins_apart(after, problem.start) or words
-        return [Violation(Reason.KINEMATICS, 0.0, words)] if words else []
 
     def take_word(self, refused: float, limits: Limits) -> None:
         """Leave the kinematics of references to CommonRoad's drivability checker, which was asked.
@@ -211,35 +210,34 @@ class Checker:
 
     def check_reference(self, reference: Curve, t_end: float) -> Verdict:
         """Verdict on a reference trajectory: by the same measure as a repair's, jerks apart."""
-        path, s, slip, orientation = self._follow(reference, t_end)
-        if not is_finite(path):
+        kept = self._follow(reference, t_end)
+        if not is_finite(path := kept.path):
             return Verdict((Violation(Reason.KINEMATICS, 0.0, "the trajectory is not finite"),))
-        found, contact = self._clear(path, s, orientation, 0, 0.0, fully=True)
+        found, contact = self._clear(path, kept.motion[0], kept.turned, 0, 0.0, fully=True)
         self._touched = reference, t_end, contact
         if self.config.limits:
             found += self._reference_limits(reference, t_end)
         until = min((violation.time for violation in found), default=float("inf"))
         if self._refused is None:
-            found += self._kinematics(path, slip, orientation, until)
+            found += self._kinematics(path, kept.slip, kept.turned, until)
         elif self._refused < t_end - INSTANT:
             found.append(Violation(Reason.KINEMATICS, self._refused, "refused as it was given"))
         return Verdict(tuple(found))
 
-    def _follow(self, reference: Curve, t_end: float) -> tuple[CartesianPath, Array, Array, Array]:
-        """Path, arc lengths, slip angle and orientation along the reference; kept for the repairs."""
+    def _follow(self, reference: Curve, t_end: float) -> Followed:
+        """The reference, and what is known along it; kept for the repairs."""
         times = self.times(t_end)
         motion = motion_of(reference.sample(times), len(times))
         path = self.scene.frame.carry(times, motion)
-        slip, orientation = self.scene.model.angles(path, slip_at_start(self.scene, path))
-        self._followed = Followed(reference, t_end, motion, slip, float(path.heading[0]))
-        return path, motion[0], slip, orientation
+        slip, turned = self.scene.model.angles(path, slip_at_start(self.scene, path))
+        kept = self._followed = Followed(reference, t_end, motion, path, slip, turned)
+        return kept
 
     def _kept(self, reference: Curve, t_end: float) -> Followed:
         """What was kept of the reference, at least until ``t_end``."""
-        kept = self._followed
-        while kept is None or kept.reference is not reference or kept.t_end < t_end:
-            self._follow(reference, t_end)
-            kept = self._followed  # another thread may have put its own reference there
+        kept = self._followed  # another thread may put its own reference there
+        if kept is None or kept.reference is not reference or kept.t_end < t_end:
+            return self._follow(reference, t_end)
         return kept
 
     def _spliced(

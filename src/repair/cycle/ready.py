@@ -43,7 +43,7 @@ def configured(config: Config | None, keys: Mapping[str, Any]) -> Config:
 
 
 def _of_cycles(config: Config) -> Config:
-    """No helpers where none are named: they are there for late times, and one takes longer than a cycle has."""
+    """No helpers where none are named: they find later repairs, and one takes longer than a cycle has."""
     there = {item.name for item in fields(config)}  # not those that were registered after it was made
     asking = {name: spec.helpers for name, spec in BACKENDS.items() if isinstance(spec.helpers, str)}
     sections = {

@@ -220,4 +220,4 @@ def _passing(
     columns.setflags(write=False)
     guide = FrenetTrajectory(times, *columns)
     sides = partial(sides_of, guide.position, boxes.lower, boxes.upper)
-    return Passing(maneuver, guide, sides, cost, cost < _SHUT)
+    return Passing(maneuver, guide, sides, cost, cost < _SHUT, max(cost - _SHUT, 0.0))

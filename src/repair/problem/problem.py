@@ -76,6 +76,9 @@ class Passing:
         The guide's cost; smaller is gentler.
     open : bool
         Whether the guide keeps clear of every box and within the limits; if not, it comes closest to that.
+    misses : float
+        By how much it is not: ten times how deep it gets into a box [m], and by what it is beyond the limits
+        in bends [m/s²].
     """
 
     maneuver: Maneuver
@@ -83,6 +86,7 @@ class Passing:
     sides: npt.NDArray[np.int8] | Callable[[], npt.NDArray[np.int8]]
     cost: float
     open: bool = True
+    misses: float = 0.0
 
     @cached_property
     def side(self) -> npt.NDArray[np.int8]:

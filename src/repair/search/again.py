@@ -78,6 +78,8 @@ def probe_again(
     """
     tried = list(probe.tried)
     for problem, first in rejected:
+        if first.blocked:  # whatever it is tightened by
+            continue
         verdict, taken = first.verdict, Notches.of(first.tightened, source.notches)
         while not verdict.ok:
             further = taken.after(verdict)

@@ -69,7 +69,11 @@ def probe_smaller(
                 way = _way(problem, obstacle)
                 enough[way] = min(enough.get(way, math.inf), known)
 
+    blocked = any(one.blocked for _, one in rejected)
+
     def may_pass(problem: RepairProblem) -> bool:
+        if blocked and not problem.lateral:
+            return False
         ways = (_way(problem, obstacle) for obstacle in near)
         return all(problem.margin <= enough.get(way, math.inf) for way in chain((_side(problem),), ways))
 

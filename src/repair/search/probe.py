@@ -28,6 +28,8 @@ __all__ = [
     "words",
 ]
 
+_NEAR = 3.0  # whose guide misses an open way by less (``Passing.misses``) is hardly ever blocked
+
 #: The sides that failed, and how.
 Rejected = list[tuple[RepairProblem, Probe]]
 
@@ -75,6 +77,10 @@ class TrajectoryChecker(Protocol):
         """What :meth:`check` says of the traffic, if anything."""
         ...
 
+    def blocked(self, problem: RepairProblem) -> Violation | None:
+        """What :meth:`check` says of each curve that keeps to the path of the reference, if that is known."""
+        ...
+
 
 class Hopeless(Protocol):
     """Says where it is proven that nothing is feasible; an answer of no says nothing."""
@@ -104,6 +110,8 @@ class Budget:
     collides: bool = False
     # what passed in an earlier search that is much like this one: its side is asked first, as tight
     like: Like | None = None
+    # of the last t_rep that was asked about: what each curve that keeps to the path is refused for
+    blocked: tuple[float, Violation | None] | None = None
 
     @property
     def left(self) -> float | None:
@@ -175,7 +183,11 @@ def probe_one(
     warm_start: Curve | None,
     budget: Budget,
 ) -> Probe:
-    """Solve one side and check it."""
+    """Solve one side and check it, unless it is known to be blocked whatever comes of it."""
+    maneuver = problem.passing.maneuver if problem.passing is not None else None
+    if (why := _blocked(problem, backend, checker, budget)) is not None:
+        nobody, no = SolveResult(SolveStatus.INFEASIBLE, detail=f"not asked: {why.detail}"), Verdict((why,))
+        return Probe(t_rep, nobody, no, maneuver, margin=problem.margin, refused=no, blocked=True)
     try:
         solve = backend.solve(problem, warm_start=warm_start, time_limit=budget.left)
     except OutOfTime as late:  # of something in it that looks at the deadline
@@ -189,10 +201,30 @@ def probe_one(
         detail = "a curve was found, and no time was left to judge it"
         solve = replace(solve, status=SolveStatus.TIME_LIMIT, curve=None, closest=None, detail=detail)
         verdict = _unsolved(solve, t_rep)
-    maneuver = problem.passing.maneuver if problem.passing is not None else None
     if maneuver is None and backend.capabilities.own_way and solve.curve is not None:
         maneuver = taken(problem, solve.curve)
     return Probe(t_rep, solve, verdict, maneuver, budget.clock() - begin, margin=margin, refused=refused)
+
+
+def _blocked(
+    problem: RepairProblem, backend: RepairBackend, checker: TrajectoryChecker, budget: Budget
+) -> Violation | None:
+    """What the checker says of every curve on a path that is kept; asked where no guide is open.
+
+    Where that is so once at a t_rep, it is for all margins. Strict problems are asked as the paper asks them,
+    and soft backends in a search of its own, whose curves show what comes of it.
+    """
+    passing, can = problem.passing, backend.capabilities
+    if passing is None or problem.lateral or problem.strict or not can.keeps_path:
+        return None
+    if not can.relaxes and budget.like is None:
+        return None
+    known = budget.blocked
+    if known is None or known[0] != problem.t_rep:
+        if passing.open or passing.misses < _NEAR:
+            return None
+        known = budget.blocked = problem.t_rep, checker.blocked(problem)
+    return known[1]
 
 
 def words(probe: Probe, tightened: Sequence[float] = ()) -> str:

@@ -47,6 +47,8 @@ class Probe:
         By what the problem was tightened: room [m], road [m], limits (share).
     refused : Verdict or None
         The checker's on the curve that comes closest, where that is no repair either.
+    blocked : bool
+        Nobody was asked, as each curve that keeps to the path would be refused.
     """
 
     t_rep: float
@@ -61,6 +63,7 @@ class Probe:
     fallback: bool = False
     tightened: tuple[float, ...] = (0.0, 0.0, 0.0)
     refused: Verdict | None = None
+    blocked: bool = False
 
     @property
     def feasible(self) -> bool:

@@ -88,7 +88,8 @@ def visit(
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
     try:
-        near = any(too_close(failed.verdict) for _, failed in rejected)
+        hard = backend.capabilities.relaxes  # who may go closer than asked for, not farther
+        near = any(too_close(failed.verdict) and not (hard and failed.blocked) for _, failed in rejected)
         if not probe.feasible and tightens and near and _any_shut(first):
             for problems in other_ways(first, source.widened(t_rep)):
                 if budget.spent:

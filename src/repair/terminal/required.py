@@ -28,6 +28,10 @@ class SafeEnds:
         """As the checker's: of the repair itself."""
         return self.checker.refuses_traffic(problem, curve)
 
+    def blocked(self, problem: RepairProblem) -> Violation | None:
+        """As the checker's."""
+        return self.checker.blocked(problem)
+
     def check(self, problem: RepairProblem, curve: Curve) -> Verdict:
         """Verdict on ``curve`` after the reference until ``problem.t_rep``, and on its end."""
         verdict = self.checker.check(problem, curve)

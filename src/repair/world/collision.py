@@ -290,6 +290,34 @@ class CollisionWorld:
             or self._closely(here, turn, sample, none, ego[:1], row[m : m + 1], wide, since) is not None
         )
 
+    def meets(
+        self, sample: Index, here: Points, orientation: Array, margin: complex
+    ) -> npt.NDArray[np.bool_]:
+        """Which of the shapes (M,) each pose (P,) meets at a sample of its own; polygons are left out.
+
+        Parameters
+        ----------
+        sample : (P,) int array
+            Counted from the start of the scenario.
+        here, orientation : (P,) array
+            Centres x + iy [m], and angles [rad].
+        margin : complex
+            By how much the ego's rectangle is enlarged along and across [m]; negative makes it smaller.
+        """
+        table, count = self._table, len(self._table.kind)
+        row = sample[:, None] * count + np.arange(count)
+        apart = np.abs(table.shapes[0].take(row) - here[:, None])
+        ego, track = (apart <= self._radius + np.abs(table.size.take(row))).nonzero()
+        met = np.zeros(apart.shape, dtype=np.bool_)
+        row = row[ego, track]
+        met[ego, track] = self._unsettled(here, orientation, None, ego, row, margin)
+        met[:, self._table.kind == POLYGON] = False  # of which this knows the circles around them alone
+        return met
+
+    def owner(self, shape: int) -> Obstacle:
+        """Whose shape it is."""
+        return self._obstacles[self._table.owner[shape]]
+
     def _unsettled(
         self, here: Points, orientation: Array, reach: Array | None, ego: Index, row: Index, margin: complex
     ) -> npt.NDArray[np.bool_]:

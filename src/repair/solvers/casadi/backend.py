@@ -85,7 +85,7 @@ class CasadiBackend:
     """
 
     name = "casadi"
-    capabilities = Capabilities(relaxes=True, keeps_hull=True, uses_warm_start=True)
+    capabilities = Capabilities(relaxes=True, keeps_hull=True, keeps_path=True, uses_warm_start=True)
 
     def __init__(self, config: CasadiConfig | None = None, *, degree: int = 3, spacing: float = 0.2) -> None:
         self.config = config or CasadiConfig()

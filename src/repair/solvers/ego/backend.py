@@ -60,7 +60,7 @@ class EgoBackend:
     """
 
     name = "ego"
-    capabilities = Capabilities()
+    capabilities = Capabilities(keeps_path=True)
 
     def __init__(
         self,
