@@ -222,6 +222,28 @@ def test_others_are_asked(source, can):
     assert not probe.solve.detail.startswith("not asked")
 
 
+def test_what_a_helper_has_found_is_asked_all_the_same():
+    """It may go aside whatever it is called: who is shown it is asked, though the path is blocked."""
+    curve = toy.constant(10.0)
+
+    class Shows:
+        name, capabilities = "shows", Capabilities(own_way=True)
+
+        def solve(self, problem, *, warm_start=None, time_limit=None):
+            return SolveResult(SolveStatus.SOLVED, curve=curve, objective=1.0)
+
+    class Helped(Source):
+        def without_guide(self, t_rep):
+            return [replace(self.at(t_rep)[0], passing=None)]
+
+        def along(self, manoeuvre, kind, *, jumps=False):
+            return self.at(manoeuvre.t_start)[0]
+
+    probe, margins, _ = asked(Helped(), helpers={"shows": Shows})
+    assert margins == [0.1]
+    assert probe.tried[0] == "yield: collision"
+
+
 def test_in_cycles_soft_ones_are_not_asked_either():
     like = Like(Probe(0.0, SolveResult(SolveStatus.INFEASIBLE), Verdict()))
     assert asked(relaxes=False, like=like)[1:] == ([], 1)

@@ -400,6 +400,15 @@ def test_sides_are_compared_at_the_last_feasible_time_alone():
     assert [len(probe.tried) for probe in given.probes] == [3, 3]
 
 
+def test_sides_that_are_compared_are_not_shown_the_answer():
+    """A hard backend that is shown a curve of this very time makes one on the same side of it."""
+    backend = FakeBackend(capabilities=Capabilities(uses_warm_start=True))
+    found = search(until(0.4), source=FakeSource(BOTH), backend=backend, rule="scan")
+    assert len(found.best.tried) == 3
+    assert backend.warm[-2:] == [None, None]
+    assert any(curve is not None for curve in backend.warm)
+
+
 def test_a_side_that_is_compared_keeps_to_the_time_limit():
     clock = BentClock()
     backend = FakeBackend(on_solve=lambda: clock.tick(1.0))

@@ -238,13 +238,16 @@ def search_f_ttr(
 
 
 def _compare(probes: list[Probe], backend: RepairBackend, checker: TrajectoryChecker, budget: Budget) -> None:
-    """Ask the last feasible t_rep for the sides that are left, and keep the best of them all."""
+    """Ask the last feasible t_rep for the sides that are left, and keep the best of them all.
+
+    They begin without its curve: from a verified one of this very t_rep a hard backend makes one on the same
+    side (:func:`repair.search.visit._helped_by`).
+    """
     k, last = max(((k, p) for k, p in enumerate(probes) if p.feasible), key=lambda one: one[1].t_rep)
     left = budget.unasked[last.t_rep]
     if not left or budget.spent:
         return
-    warm_start = last.solve.curve if backend.capabilities.uses_warm_start else None
     with budget.watched():
-        others, _ = probe_sides(last.t_rep, left, backend, checker, "best", warm_start, budget)
+        others, _ = probe_sides(last.t_rep, left, backend, checker, "best", None, budget)
     best = others if better(others, last) else last
     probes[k] = replace(best, tried=(*last.tried, *others.tried))

@@ -186,6 +186,7 @@ def _helped_by(
         return probe, found.solve.curve is not None
     along = source.along(found.solve.curve, found.maneuver or Maneuver.YIELD, jumps=can.jumps)
     curve = found.solve.curve
+    budget.blocked = t_rep, None  # it may be aside of the path, whatever it is called
     again = probe_one(t_rep, along, backend, checker, curve, budget)
     if not again.feasible and any(source.notches):
         again = probe_again(
