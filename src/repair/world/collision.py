@@ -26,8 +26,7 @@ from repair.timegrid import INSTANT
 from repair.world.advance import first_touch
 from repair.world.contact import Contact, told
 from repair.world.table import TrackTable
-from repair.world.touching import CLOCKWISE, TOUCH, rectangles_touch
-from repair.world.tracks import POLYGON, RECTANGLE, Index, as_complex, ego_room
+from repair.world.tracks import POLYGON, Index, as_complex, ego_room
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
@@ -92,7 +91,6 @@ class CollisionWorld:
         self._obstacles = tuple(obstacles)
         self._half, self._radius = complex(vehicle.half_length, vehicle.half_width), vehicle.radius
         self._diagonal = np.array(self._half)  # an array for the reason that CLOCKWISE is one
-        self._sides = np.array((vehicle.half_length, vehicle.half_width))
         self._table = TrackTable(self._obstacles, self.n_samples, substeps, self._radius)
 
     def contact(self, x: Array, y: Array, orientation: Array, start: int = 0) -> Contact | None:
@@ -321,30 +319,8 @@ class CollisionWorld:
     def _unsettled(
         self, here: Points, orientation: Array, reach: Array | None, ego: Index, row: Index, margin: complex
     ) -> npt.NDArray[np.bool_]:
-        """Which pairs of a sample and a shape may meet until half way to the samples around.
-
-        Parameters
-        ----------
-        reach : (K,) array or None
-            How far any point of the ego moves until the samples around [m]. None asks for those that meet at
-            the sample itself; of polygons, their circumcircles.
-        """
-        table, slack = self._table, np.zeros(len(row))
-        if reach is not None:
-            slack = reach.take(ego) * table.share.take(row % len(table.kind)) + table.slack.take(row)
-        axis = np.exp(orientation.take(ego) * CLOCKWISE)
-        shapes = table.shapes.take(row, axis=1)
-        shapes[0] -= here.take(ego)
-        shapes *= axis
-        size, around = table.size.take(row), shapes[0].copy() if table.any_round else None
-        wide = self._diagonal + margin
-        hit = rectangles_touch(shapes, table.axis.take(row) * axis, wide, size, slack * (1 + 1j))
-        if around is not None:
-            sides = self._sides + np.array((margin.real, margin.imag))
-            beyond = np.maximum(np.abs(around.view(np.float64).reshape(-1, 2)) - sides, 0.0)
-            round_hit = np.hypot(beyond[:, 0], beyond[:, 1]) <= size.real + TOUCH + slack
-            hit = np.where(table.kind[row % len(table.kind)] == RECTANGLE, hit, round_hit)
-        return hit
+        """As :meth:`repair.world.table.TrackTable.unsettled`."""
+        return self._table.unsettled(self._diagonal + margin, here, orientation, reach, ego, row)
 
     def _closely(
         self, here: Points, orientation: Array, start: int, spare: Array, ego: Index, row: Index,

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from repair.arrays import Array, Points, wrap
 from repair.world.advance import Left, Motion, circle_left, polygons_left, rectangle_left
+from repair.world.touching import CLOCKWISE, TOUCH, rectangles_touch
 from repair.world.tracks import (
     AFTER,
     BEFORE,
@@ -146,6 +147,39 @@ class TrackTable:
         """As :meth:`near`, nothing left out."""
         ego, track = np.indices((count, len(self.kind))).reshape(2, -1)
         return ego, (ego + start) * len(self.kind) + track
+
+    def unsettled(
+        self, wide: Points, here: Points, orientation: Array, reach: Array | None, ego: Index, row: Index
+    ) -> npt.NDArray[np.bool_]:
+        """Which pairs of a sample and a shape may meet until half way to the samples around.
+
+        Parameters
+        ----------
+        wide : () complex array
+            Half the ego's length and width, with the margin [m].
+        here, orientation : (K,) array
+            Centres x + iy [m] and orientations [rad] of the ego.
+        reach : (K,) array or None
+            How far any point of the ego moves until the samples around [m]. None asks for those that meet at
+            the sample itself; of polygons, their circumcircles.
+        ego, row : (n,) int array
+            The ego's samples, and the shapes' rows.
+        """
+        slack = np.zeros(len(row))
+        if reach is not None:
+            slack = reach.take(ego) * self.share.take(row % len(self.kind)) + self.slack.take(row)
+        axis = np.exp(orientation.take(ego) * CLOCKWISE)
+        shapes = self.shapes.take(row, axis=1)
+        shapes[0] -= here.take(ego)
+        shapes *= axis
+        size, around = self.size.take(row), shapes[0].copy() if self.any_round else None
+        hit = rectangles_touch(shapes, self.axis.take(row) * axis, wide, size, slack * (1 + 1j))
+        if around is not None:
+            beyond = np.abs(around.view(np.float64).reshape(-1, 2)) - (wide.real.item(), wide.imag.item())
+            away = np.hypot(*np.maximum(beyond, 0.0).T)
+            round_hit = away <= size.real + TOUCH + slack
+            hit = np.where(self.kind[row % len(self.kind)] == RECTANGLE, hit, round_hit)
+        return hit
 
     def intervals(self, ego: Index, row: Index, since: Index, last: int) -> list[tuple[int, int, int]]:
         """Pairs of a sample and a shape as the two intervals beside it, or as the instant that it is.
