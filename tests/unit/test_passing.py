@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tests import toy
 
 from repair.arrays import frozen
 from repair.problem.lateral import lateral_profiles, quintics
-from repair.problem.passing import open_passings, possible_maneuvers
+from repair.problem.passing import _least_bad, open_passings, possible_maneuvers
 from repair.problem.problem import Maneuver, Side
 from repair.problem.speeds import Bends, speed_profiles
 from repair.problem.surroundings import sides_of, surroundings
@@ -375,3 +376,16 @@ def test_who_gets_past_the_obstacle_in_conflict_goes_ahead(rows, v0, margin):
     np.testing.assert_array_equal(passed, False if others is None else others)
     if Maneuver.GO_AHEAD in found:
         np.testing.assert_array_equal(found[Maneuver.GO_AHEAD], ~passed)
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_the_least_bad_speed_profile_is_the_least_bad_of_all(few):
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        excess = np.maximum(rng.normal(size=40), 0.0)
+        depth = np.maximum(rng.normal(0.0, 3.0, 40) + 2.0 * few, 0.0)
+        depth[rng.random(40) < 0.2] = np.inf
+        bends = SimpleNamespace(excess=lambda p, known=excess: known[p], of_all=excess)
+        p, badness = _least_bad(depth, bends)
+        assert (p, badness) == (int((depth + excess).argmin()), (depth + excess).min())
+    assert _least_bad(np.full(40, np.inf), bends)[1] == np.inf

@@ -30,6 +30,8 @@ __all__ = ["open_passings", "possible_maneuvers"]
 
 # The cost of a way that is not open starts here, far above those of open ones.
 _SHUT = 1e3
+# Of more speed profiles than these what they exceed is worked out, and kept, for all of them.
+_FEW = 15
 
 
 def open_passings(
@@ -160,19 +162,34 @@ def _closest(
     shut: list[_Shut], wanted: list[Maneuver | None], bends: Bends
 ) -> dict[Maneuver, tuple[float, int, LateralProfile]]:
     """Of the manoeuvres that are not open the one of each wanted kind that comes closest to it."""
-    excess = bends.of_all
     closest: dict[Maneuver | None, tuple[float, int, LateralProfile, Maneuver]] = {}
     for profile, maneuver, others, meetings in shut:
         if profile.maneuver not in wanted:
             continue
-        badness = 10.0 * _depth(meetings) + excess
+        depth = 10.0 * _depth(meetings)
         if others is not None:
-            badness[others] = np.inf
-        p = int(badness.argmin())
-        if badness[p] < (closest[profile.maneuver][0] if profile.maneuver in closest else np.inf):
-            closest[profile.maneuver] = (float(badness[p]), p, profile, maneuver)
+            depth[others] = np.inf
+        p, badness = _least_bad(depth, bends)
+        if badness < (closest[profile.maneuver][0] if profile.maneuver in closest else np.inf):
+            closest[profile.maneuver] = (badness, p, profile, maneuver)
     found = (closest[kind] for kind in wanted if kind in closest)
     return {maneuver: (_SHUT + badness, p, profile) for badness, p, profile, maneuver in found}
+
+
+def _least_bad(depth: Array, bends: Bends) -> tuple[int, float]:
+    """The speed profile of which depth (P,) and excess make least in all, and how much.
+
+    No excess is below 0: looked at are those that are no worse by their depth than the least deep one in all.
+    """
+    first = int(depth.argmin())
+    most = depth.item(first) + bends.excess(slice(first, first + 1)).item()
+    near = (depth <= most).nonzero()[0]
+    if len(near) == 1:
+        return first, most
+    excess = bends.excess(near) if len(near) <= _FEW else bends.of_all.take(near)
+    badness = depth.take(near) + excess
+    k = int(badness.argmin())
+    return int(near[k]), float(badness[k])
 
 
 def possible_maneuvers(
