@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from repair.arrays import Array, Points, wrap
+from repair.arrays import Array, Points, largest, wrap
 
 if TYPE_CHECKING:
     from repair.scene.traffic.obstacle import Obstacle
@@ -246,8 +246,12 @@ def ego_room(here: Points, orientation: Array, radius: float) -> tuple[Array, Ar
     count = len(here)
     spare, reach = np.zeros((2, count))
     if count > 1:
-        steps, turns = here[1:] - here[:-1], wrap(orientation[1:] - orientation[:-1])
-        ways = np.abs(steps) + radius * np.abs(turns)
+        steps, turns = here[1:] - here[:-1], orientation[1:] - orientation[:-1]
+        size = np.abs(turns)
+        if not largest(size) < np.pi:
+            turns = wrap(turns)
+            size = np.abs(turns)
+        ways = np.abs(steps) + radius * size
         if count > 2:
             bend = np.abs(steps[1:] - steps[:-1]) + radius * np.abs(turns[1:] - turns[:-1])
             bend *= _BULGE
