@@ -127,8 +127,9 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
         # an earlier version has no such keys, and no other backend that it would ask
         keys = [k for k in overrides if name != "before" or not k.startswith(("fallback", "casadi.helpers"))]
         others[name] = Rebuilding(sources, file, backend, keys)
-    spent: list[float] = []
-    parts: dict[str, list[float]] = defaultdict(list)
+    # filled before it begins: what is measured is not to be this benchmark's own growth
+    spent = np.full(cycles, np.nan)
+    parts: dict[str, np.ndarray] = defaultdict(lambda: np.full(cycles, np.nan))
     slow: dict[str, list[float]] = {name: [] for name in others}
     memory, every = [], max(cycles // max(rebuilds, 1), 1)
     while math.gcd(every, EPISODE) > 1:  # else only some places of a drive are rebuilt
@@ -140,9 +141,9 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
         traffic = predictions(cycle.traffic)
         begin = time.process_time()
         answer = watch.update(cycle.plan, traffic=traffic, now=cycle.now)
-        spent.append(time.process_time() - begin)
+        spent[k] = time.process_time() - begin
         for name, seconds in {**answer.prepared.phases, "search": answer.search.wall_time}.items():
-            parts[name].append(seconds)
+            parts[name][k] = seconds
         if k % every == every // 2:
             for name, other in others.items():
                 slow[name].append(other(cycle.plan, cycle.traffic)[1])
@@ -151,7 +152,7 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
     memory.append(resident())
     for other in others.values():
         other.close()
-    warm = 1e3 * np.array(spent[20:])
+    warm = 1e3 * spent[20:]
     median = float(np.median(warm))
     p99, p999 = np.percentile(warm, (99, 99.9))
     lines = [
@@ -159,7 +160,7 @@ def speed(file: Path, label: str, cycles: int, rebuilds: int, before: Path | Non
         f"({p999 / median:.1f} x the median), most {warm.max():.2f} ms; memory grew by "
         f"{memory[-1] - memory[0]:.1f} MB after the first tenth"
     ]
-    shares = {name: float(np.median(values)) for name, values in parts.items()}
+    shares = {name: float(np.nanmedian(values)) for name, values in parts.items()}
     whole = sum(shares.values())
     lines.append("  " + ", ".join(f"{name} {v / whole:.0%}" for name, v in shares.items()))
     for name, values in slow.items():
