@@ -33,13 +33,13 @@ PLAIN = ("fallback=[]",)
 TENTH = 10  # of the cycles without a conflict one in so many is compared, too
 
 
-def compared(file: Path, count: int, backend: str) -> Counter[str]:
+def compared(file: Path, count: int, backend: str, keys: list[str]) -> Counter[str]:
     """Cycles of one file, by how the Repairer's answer stands to the fresh one; differences are printed."""
     import repair
 
     scene = repair.load_scene(file)
-    watch = repair.Repairer(scene, backend=backend, overrides=[*PLAIN])
-    scan = repair.load_config(backend=backend, overrides=[*PLAIN, "search.rule=scan"])
+    watch = repair.Repairer(scene, backend=backend, overrides=[*PLAIN, *keys])
+    scan = repair.load_config(backend=backend, overrides=[*PLAIN, *keys, "search.rule=scan"])
     found: Counter[str] = Counter()
     for k, cycle in enumerate(itertools.islice(cycles(scene), count)):
         if cycle.now == 0.0:
@@ -109,6 +109,7 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=20, help="spread over the folder")
     parser.add_argument("--cycles", type=int, default=200, help="of each file")
     parser.add_argument("--backend", default="ego")
+    parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="for both of them")
     arguments = parser.parse_args()
     files = sorted(arguments.folder.glob("*.xml"))
     chosen = [
@@ -118,7 +119,7 @@ def main() -> int:
     for file in chosen:
         begin = time.perf_counter()
         try:
-            found = compared(file, arguments.cycles, arguments.backend)
+            found = compared(file, arguments.cycles, arguments.backend, arguments.set)
         except RepairError as error:
             print(f"{file.name}: {error}", flush=True)
             continue

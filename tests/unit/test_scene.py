@@ -526,6 +526,7 @@ def test_malformed_files(tmp_path: Path) -> None:
         "empty.xml": ("", "is empty"),
         "text.xml": ("no xml at all", "is not XML"),
         "cut.xml": ("<commonRoad timeStepSize='0.1'><lanelet id='1'>", "is not XML"),
+        "binary.pb": ("\x08\x01 of protobuf", "is not XML: .*; write it as XML with commonroad-io"),
         "other.xml": ("<html/>", "not a CommonRoad file"),
         "bomb.xml": (bomb, "DOCTYPE"),
         "dt.xml": ("<commonRoad timeStepSize='0'/>", "time step"),

@@ -291,3 +291,8 @@ def test_a_search_that_comes_no_closer_ends():
         assert solve.status is SolveStatus.INFEASIBLE
         counts[patience] = solve.iterations
     assert counts[1] <= counts[3] <= counts[14] < 0.5 * ShootingConfig().iterations
+
+
+def test_more_elites_than_trajectories_are_refused():
+    with pytest.raises(repair.RepairError, match=r"elite 12 are the best of shooting\.population 8"):
+        make_backend("shooting", load_config(backend="shooting", overrides=["shooting.population=8"]))

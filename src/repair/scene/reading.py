@@ -120,7 +120,8 @@ def _root(data: bytes, name: str) -> tuple[str, dict[str, str]]:
     except _Stop:
         pass
     except (expat.ExpatError, LookupError, ValueError) as error:  # the latter two: its encoding
-        raise ScenarioError(f"{name} is not XML: {error}") from error
+        known = "; write it as XML with commonroad-io" if name.endswith(".pb") else ""
+        raise ScenarioError(f"{name} is not XML: {error}{known}") from error
     return found[0]
 
 

@@ -15,6 +15,7 @@ import time
 from repair.backend.base import Capabilities, Configuration, SolveResult, SolveStatus
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime, until
+from repair.errors import BackendError
 from repair.problem.problem import RepairProblem
 from repair.solvers.shooting.plans import ALONG, FREE, Plan
 from repair.solvers.shooting.settings import ShootingConfig
@@ -37,6 +38,11 @@ class ShootingBackend:
 
     def __init__(self, config: ShootingConfig | None = None) -> None:
         self.config = config or ShootingConfig()
+        if self.config.elite > self.config.population:
+            raise BackendError(
+                f"shooting.elite {self.config.elite} are the best of shooting.population "
+                f"{self.config.population}, and cannot be more"
+            )
 
     def solve(
         self,
