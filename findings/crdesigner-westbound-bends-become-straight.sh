@@ -8,8 +8,8 @@
 # 90 degrees or more. Turned by 90 to 240 degrees the whole bend is one line along its first heading, 49 m off at the end, with the right
 # length; turned by 270 it is torn by 3.5 m. Eastbound it is right to a centimetre, and with vertices 5 m apart every way.
 # The right files cannot be read back by the same package: they have spirals of one curvature, at which its reader raises AttributeError.
-# Why it matters: maps with fine vertices, such as those of this tool's own readers, lose half of their bends; the file is
-# consistent, and no checker complains.
+# Why it matters: a map with fine vertices loses the bends that lead west and keeps those that lead east, in a file that is
+# consistent in itself.
 #
 # Output seen:
 #   commonroad-scenario-designer 0.8.5

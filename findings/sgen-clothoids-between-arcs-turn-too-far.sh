@@ -5,8 +5,8 @@
 # What happens: its length is 2 a by the larger of the two curvatures, which is right only if the other one is 0. From radius 50 to 33 m a
 # quarter turns by 150 degrees, from 53 to 50 m by 176, and an S-bend from left to right by less than it should. Length and cdot
 # given instead are right. Four quarters make an oval ring: with angles it turns by 600 degrees and ends 43 m from its start.
-# Why it matters: ramps and roundabouts are made of such clothoids; the file is consistent, since what follows is attached to
-# where the road has got to, so that no checker complains about the wrong bend.
+# Why it matters: ramps and roundabouts are made of such clothoids; the file is consistent in itself, since what
+# follows is attached to where the road has got to.
 #
 # Output seen:
 #   scenariogeneration 0.16.7
