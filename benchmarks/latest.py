@@ -42,11 +42,13 @@ def latest(prepared: Prepared, name: str, bound: float) -> tuple[float | None, f
     return None, time.process_time() - begin
 
 
-def rows_of(file: Path, reference: str, backends: list[str], step: float) -> list[dict[str, Any]]:
+def rows_of(
+    file: Path, reference: str, backends: list[str], step: float, more: list[str]
+) -> list[dict[str, Any]]:
     """A row for each backend; none where there is no conflict that can be avoided."""
     rows = []
     for name in backends:
-        keys = [f"reference.source={reference}", f"search.delta_t={step}"]
+        keys = [f"reference.source={reference}", f"search.delta_t={step}", *more]
         config = load_config(overrides=keys, backend=name)
         prepared = prepare(load_scene(file, config), config)
         conflict = prepared.conflict
@@ -104,13 +106,14 @@ def main() -> int:
     parser.add_argument("--step", type=float, default=0.1, help="of the grid [s]")
     parser.add_argument("--part", default="0/1", help="K/N: every N-th file from the K-th on")
     parser.add_argument("--out", type=Path, help="a CSV file")
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE")
     asked = parser.parse_args()
     first, every = map(int, asked.part.split("/"))
     rows: list[dict[str, Any]] = []
     for file in sorted(asked.folder.glob("*.xml"))[first::every]:
         for reference in asked.reference:
             try:
-                made = rows_of(file, reference, asked.backend, asked.step)
+                made = rows_of(file, reference, asked.backend, asked.step, asked.set)
             except RepairError as error:
                 print(f"{file.name} {reference}: {error}", file=sys.stderr)
                 continue

@@ -1,4 +1,4 @@
-"""Times-to-repair at which no speed along the path of the reference is of use: proven, and not asked."""
+"""Times-to-repair that are nearly too late: where no speed is of use, and where brakes at once still are."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from tests import roads, toy
 
+import repair
 from repair.api import find
 from repair.backend.base import Capabilities, SolveResult, SolveStatus
+from repair.certify.recompute import certify
 from repair.check.checker import Checker
 from repair.check.verdict import Conflict, Reason, Verdict, Violation
 from repair.config import load_config
@@ -247,3 +249,26 @@ def test_what_a_helper_has_found_is_asked_all_the_same():
 def test_in_cycles_soft_ones_are_not_asked_either():
     like = Like(Probe(0.0, SolveResult(SolveStatus.INFEASIBLE), Verdict()))
     assert asked(relaxes=False, like=like)[1:] == ([], 1)
+
+
+# -- begun at once -----------------------------------------------------------------------------------------
+
+
+def test_who_brakes_at_once_is_later_and_certified(tmp_path, monkeypatch):
+    file, folder = tmp_path / "scenario.xml", tmp_path / "out"
+    file.write_text(roads.scenario(), encoding="utf-8")
+    keys = [*KEYS, "casadi.helpers=[]", "casadi.solver=sqpmethod", "search.delta_t=0.1"]
+
+    def answer():
+        return repair.repair(file, backend="casadi", overrides=keys)
+
+    found = answer()
+    assert found.search.best.jump > 5.0
+    found.save(folder, figure=False)
+    certificate = certify(folder)
+    assert certificate.ok
+    assert [row.name for row in certificate.rows if row.claim and not row.ok] == []
+    monkeypatch.setattr("repair.search.visit.probe_begun", lambda probe, *others: probe)
+    without = answer()
+    assert without.search.best.jump == 0.0
+    assert found.f_ttr > without.f_ttr

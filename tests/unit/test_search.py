@@ -692,7 +692,7 @@ def test_smaller_margins_are_asked_for_where_they_may_help():
 
     (probe,) = search(Judge(), source=source, backend=backend, upper=0.0).probes
     margins = {name: [] for name in ("left", "right", "yield")}
-    for text in probe.tried[3:]:
+    for text in (text for text in probe.tried[3:] if "jumps" not in text):
         name, _, rest = text.partition(": ")
         margins[name].append(rest)
     assert probe.feasible
@@ -715,7 +715,8 @@ def asked_margins(maneuver, reasons, sides=None, slower=5.0, contact=2.95):
 
     conflict = Conflict(2.9, "margin", 7, contact)
     (probe,) = search(Refusing(), source=source, backend=backend, upper=0.0, conflict=conflict).probes
-    return [float(text.rpartition("margin ")[2].removesuffix(" m)")) for text in probe.tried[1:]]
+    texts = (text for text in probe.tried[1:] if "jumps" not in text)
+    return [float(text.rpartition("margin ")[2].removesuffix(" m)")) for text in texts]
 
 
 ALL = [-0.1, -0.22, -0.3]
@@ -754,6 +755,77 @@ def test_a_guide_that_follows_the_reference_into_what_it_meets_is_not_asked():
     assert asked_margins(Maneuver.YIELD, (Reason.LIMITS,), slower=0.2) == ALL
     # of a reference that exceeds a limit it may be what helps
     assert asked_margins(Maneuver.YIELD, (Reason.LIMITS,), slower=0.1, contact=math.inf) == ALL
+
+
+class Braked(FakeBackend):
+    """Has a curve only where it may begin with brakes or with a lateral acceleration."""
+
+    def __init__(self, miss=0.4, **can):
+        super().__init__(capabilities=Capabilities(**{"relaxes": True, **can}))
+        self.miss, self.begun = miss, []
+
+    def solve(self, problem, *, warm_start=None, time_limit=None):
+        self.begun.append(problem.start[2].tolist())
+        if np.abs(problem.start[2]).max() > 3.0:
+            return super().solve(problem, warm_start=warm_start, time_limit=time_limit)
+        closest = None if self.miss is None else Closest(toy.constant(10.0), self.miss)
+        return SolveResult(SolveStatus.INFEASIBLE, closest=closest)
+
+
+def begun(maneuver, backend=None, *, harsh=-6.0, opened=True, strict=False):
+    """The probe at t_rep = 0, and the accelerations that the backend was asked to begin with."""
+
+    class Harsh(FakeSource):
+        def at(self, t_rep):
+            guide = self.passing(maneuver, t_rep).guide
+            guide = replace(guide, acceleration=np.full((3, 2), (harsh, 0.0)))
+            return tuple(
+                replace(p, strict=strict, passing=replace(p.passing, guide=guide, open=opened))
+                for p in super().at(t_rep)
+            )
+
+    class Judge(toy.Judging):
+        def check(self, problem, curve):
+            asked = np.abs(problem.start[2]).max() > 3.0
+            return Verdict() if asked else Verdict((Violation(Reason.OFF_ROAD, problem.t_rep),))
+
+    backend = backend or Braked()
+    (probe,) = search(Judge(), source=Harsh((maneuver,)), backend=backend, upper=0.0).probes
+    return probe, backend.begun
+
+
+def test_a_side_that_fails_is_begun_as_its_guide_begins():
+    probe, asked = begun(Maneuver.YIELD)
+    assert asked == [[0.0, 0.0], [-6.0, 0.0]]
+    assert probe.feasible
+    assert probe.jump == 6.0
+    assert probe.tried == (
+        "yield: not_solved", "yield: feasible (its acceleration jumps by 6.0 m/s² at t_rep)",
+    )  # fmt: skip
+    probe, asked = begun(Maneuver.LEFT, harsh=0.0)
+    assert asked[1] == [0.0, pytest.approx(0.99 * toy.LIMITS.a_lat, rel=0.02)]
+    assert probe.jump == asked[1][1]
+    assert begun(Maneuver.RIGHT, harsh=0.0)[1][1][1] == -asked[1][1]
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"strict": True},  # as the paper asks
+        {"harsh": -0.3},  # hardly another start
+        {"backend": Braked(1.6)},  # more than a jump gains
+        {"backend": Braked(relaxes=False)},
+        {"maneuver": Maneuver.LEFT, "opened": False},
+    ],
+)
+def test_it_is_not_where_that_is_of_no_use(keys):
+    probe, asked = begun(**{"maneuver": Maneuver.YIELD, **keys})
+    assert asked == [[0.0, 0.0]]
+    assert not probe.feasible
+
+
+def test_it_is_where_nobody_knows_by_how_much_it_misses():
+    assert begun(Maneuver.YIELD, Braked(None), opened=False)[0].feasible
 
 
 def test_a_side_that_opens_with_a_smaller_margin_is_asked():

@@ -6,12 +6,20 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from repair.check.verdict import Reason, Verdict
-from repair.problem.problem import RepairProblem
+from repair.problem.problem import Maneuver, RepairProblem
+from repair.problem.taken import begun
 from repair.search.probe import Budget, ProblemSource, Rejected, words
 from repair.search.result import Probe
 
-__all__ = ["Notches", "other_ways", "probe_again", "too_close"]
+__all__ = ["Notches", "other_ways", "probe_again", "probe_begun", "too_close"]
+
+_LITTLE = 0.5  # a smaller jump of the acceleration gains too little [m/s²]
+_GAINED = 1.5  # more than this is never gained by a jump along the path [m]
+
+_ASIDE = {Maneuver.LEFT: 1.0, Maneuver.RIGHT: -1.0}
 
 #: What is tightened, and the reasons it answers.
 _ANSWERS = (
@@ -95,6 +103,63 @@ def probe_again(
             if again.feasible:
                 return replace(again, tried=tuple(tried), tightened=amounts)
     return replace(probe, tried=tuple(tried))
+
+
+def probe_begun(
+    probe: Probe, rejected: Rejected, ask: Callable[[RepairProblem], Probe], budget: Budget
+) -> Probe:
+    """The sides that failed, begun with the acceleration that their guides begin with.
+
+    A vehicle's brakes are there at once, as far as its model knows, and so is a lateral acceleration; the
+    ramp of jerk from the reference's acceleration costs a metre and more of full braking. Asked are sides
+    that miss so little, and of those past an obstacle the ones whose guide is open.
+
+    Parameters
+    ----------
+    probe : Probe
+        Of the sides as they were; the answer where none of them can be had.
+    rejected : sequence of (RepairProblem, Probe)
+        The sides, and how each failed.
+    ask : callable
+        Solves and checks a problem.
+    budget : Budget
+    """
+    tried = list(probe.tried)
+    for problem, first in rejected:
+        begins = None if first.blocked else _begun(problem, first)
+        if begins is None:
+            continue
+        if budget.spent:
+            budget.cut = True
+            break
+        again = ask(begins)
+        jump = _jump(begins, problem)
+        tried.append(f"{words(again)} (its acceleration jumps by {jump:.1f} m/s² at t_rep)")
+        if again.feasible:
+            return replace(again, tried=tuple(tried), jump=jump)
+    return replace(probe, tried=tuple(tried))
+
+
+def _begun(problem: RepairProblem, failed: Probe) -> RepairProblem | None:
+    """The problem with another acceleration at its start; None where that is of little use."""
+    passing, closest = problem.passing, failed.solve.closest
+    if passing is None:
+        return None
+    wanted = passing.guide.acceleration[0]
+    if passing.maneuver in _ASIDE:
+        if not passing.open:
+            return None
+        wanted = np.array((wanted[0], _ASIDE[passing.maneuver] * problem.limits.a_lat))
+    elif closest is not None and closest.miss > _GAINED:
+        return None
+    kappa = float(problem.curvature_at(problem.start[:1, 0])[0])
+    start = begun(problem.start, wanted, kappa, problem.limits, problem.lateral)
+    begins = replace(problem, start=start)
+    return begins if _jump(begins, problem) > _LITTLE else None
+
+
+def _jump(begins: RepairProblem, problem: RepairProblem) -> float:
+    return float(np.abs(begins.start[2] - problem.start[2]).max())
 
 
 def too_close(verdict: Verdict) -> bool:

@@ -9,7 +9,7 @@ from repair.backend.base import RepairBackend
 from repair.curves.base import Curve
 from repair.deadline import OutOfTime
 from repair.problem.problem import Maneuver, RepairProblem
-from repair.search.again import other_ways, probe_again, too_close
+from repair.search.again import other_ways, probe_again, probe_begun, too_close
 from repair.search.margins import probe_smaller, with_margin
 from repair.search.probe import (
     Budget,
@@ -64,9 +64,7 @@ def visit(
     )  # fmt: skip
     if probe.feasible:
         return probe
-    helpers = {} if any(problem.strict for problem in first) else backend.capabilities.helpers
-    if helpers and _hopeless(t_rep, budget):
-        return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
+    strict, hard = any(problem.strict for problem in first), backend.capabilities.relaxes
     tightens = any(source.notches)
     if tightens:
         probe = probe_again(
@@ -74,6 +72,14 @@ def visit(
             lambda problem, by: known if known and problem is side and by == tight else one(problem, by),
             budget,
         )  # fmt: skip
+
+    if not probe.feasible and hard and not strict:
+        probe = probe_begun(
+            probe, rejected, lambda begins: probe_one(t_rep, begins, backend, checker, None, budget), budget
+        )
+    helpers = {} if strict or probe.feasible else backend.capabilities.helpers
+    if helpers and _hopeless(t_rep, budget):
+        return replace(probe, tried=(*probe.tried, "no further: it is proven to be too late"))
 
     def ask(problems: Sequence[RepairProblem]) -> tuple[Probe, Rejected]:
         return probe_sides(t_rep, problems, backend, checker, sides, warm_start, budget)
@@ -88,7 +94,7 @@ def visit(
     # another way may be the one to take. Beside a vehicle that turns they are too wide: a hard backend calls
     # a repair infeasible that the checker accepts.
     try:
-        hard = backend.capabilities.relaxes  # who may go closer than asked for, not farther
+        # Who keeps a margin may be asked for less of it, not for more.
         near = any(too_close(failed.verdict) and not (hard and failed.blocked) for _, failed in rejected)
         if not probe.feasible and tightens and near and _any_shut(first):
             for problems in other_ways(first, source.widened(t_rep)):
@@ -99,7 +105,7 @@ def visit(
                 probe = with_margin(probe, again, problems[0].margin)
                 if probe.feasible:
                     break
-        if not probe.feasible and backend.capabilities.relaxes and not nobody:
+        if not probe.feasible and hard and not nobody:
             probe = probe_smaller(probe, rejected, source.relaxed(t_rep), ask, budget)
     except OutOfTime:  # while the next problems were made
         budget.cut = True
