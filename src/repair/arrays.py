@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     pass
 
 __all__ = [
+    "HUGE",
     "Array",
     "Points",
     "column",
@@ -60,9 +61,16 @@ def wrap(angle: Any) -> Any:
     return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
 
 
+#: No figure of a result is as large.
+HUGE = 1e15
+
+
 def number(value: float | None, digits: int = 9) -> float | None:
-    """A finite plain float, or None. Nine digits: 2.9, not 2.9000000000000004."""
-    if value is None or not math.isfinite(value):
+    """A plain float, or None where it is not finite or, of a solver that diverged, means nothing.
+
+    Nine digits: 2.9, not 2.9000000000000004.
+    """
+    if value is None or not abs(value) < HUGE:
         return None
     return round(float(value), digits) + 0.0
 

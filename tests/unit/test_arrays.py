@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repair.arrays import column
+from repair.arrays import column, number
 
 metres = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -29,3 +29,10 @@ def test_a_column_is_rounded_as_each_number_is(values):
 def test_what_is_rounded_already_stays_to_the_last_bit(values):
     rounded = np.round(values, 4) + 0.0
     assert column(rounded) == rounded.tolist()
+
+
+def test_what_means_nothing_is_no_figure_of_a_result():
+    """A solver that diverges leaves residuals of 1e18 behind, which whoever reads the result refuses."""
+    assert [number(x) for x in (2.9000000000000004, -1e14, 1e15, -1e18, math.inf, math.nan, None)] == [
+        2.9, -1e14, None, None, None, None, None,
+    ]  # fmt: skip

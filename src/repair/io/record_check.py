@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-__all__ = ["Damage", "require_record"]
+from repair.arrays import HUGE
 
-_HUGE = 1e15  # no figure of a result is larger
+__all__ = ["Damage", "require_record"]
 
 
 class Damage(ValueError):
@@ -18,7 +18,7 @@ Test = Callable[[Any], bool]
 
 
 def _number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _HUGE
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < HUGE
 
 
 def _whole(value: Any) -> bool:
