@@ -19,8 +19,6 @@ __all__ = ["Notches", "other_ways", "probe_again", "probe_begun", "too_close"]
 _LITTLE = 0.5  # a smaller jump of the acceleration gains too little [m/s²]
 _GAINED = 1.5  # more than this is never gained by a jump along the path [m]
 
-_ASIDE = {Maneuver.LEFT: 1.0, Maneuver.RIGHT: -1.0}
-
 #: What is tightened, and the reasons it answers.
 _ANSWERS = (
     (Reason.COLLISION, Reason.MARGIN),
@@ -110,9 +108,9 @@ def probe_begun(
 ) -> Probe:
     """The sides that failed, begun with the acceleration that their guides begin with.
 
-    A vehicle's brakes are there at once, as far as its model knows, and so is a lateral acceleration; the
-    ramp of jerk from the reference's acceleration costs a metre and more of full braking. Asked are sides
-    that miss so little, and of those past an obstacle the ones whose guide is open.
+    A vehicle's brakes are there at once, as far as its model knows (the steering is not); the ramp of jerk
+    from the reference's acceleration costs a metre and more of full braking. Asked are sides that miss so
+    little, and of those past an obstacle the ones whose guide is open.
 
     Parameters
     ----------
@@ -145,13 +143,10 @@ def _begun(problem: RepairProblem, failed: Probe) -> RepairProblem | None:
     passing, closest = problem.passing, failed.solve.closest
     if passing is None:
         return None
-    wanted = passing.guide.acceleration[0]
-    if passing.maneuver in _ASIDE:
-        if not passing.open:
-            return None
-        wanted = np.array((wanted[0], _ASIDE[passing.maneuver] * problem.limits.a_lat))
-    elif closest is not None and closest.miss > _GAINED:
+    aside = passing.maneuver in (Maneuver.LEFT, Maneuver.RIGHT)
+    if not passing.open if aside else closest is not None and closest.miss > _GAINED:
         return None
+    wanted = np.array((passing.guide.acceleration[0, 0], problem.start[2, 1]))
     kappa = float(problem.curvature_at(problem.start[:1, 0])[0])
     start = begun(problem.start, wanted, kappa, problem.limits, problem.lateral)
     begins = replace(problem, start=start)
