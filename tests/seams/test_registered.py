@@ -82,8 +82,8 @@ def test_a_backend(path):
     assert asked == [(0.0, None)] * len(asked)
     assert result.to_dict()["config"]["lazy"] == {"share": 0.25}
     assert result.to_dict()["capabilities"] == {
-        "relaxes": False, "keeps_hull": False, "uses_warm_start": False, "own_way": False, "keeps_path": False,
-            "jumps": False,
+        "relaxes": False, "keeps_hull": False, "uses_warm_start": False, "own_way": False,
+        "keeps_path": False, "jumps": False,
     }  # fmt: skip
     with refused("'lazy' already"):
         repair.register_backend("lazy", Lazy)
