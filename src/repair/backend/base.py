@@ -71,7 +71,8 @@ class Capabilities:
     ----------
     relaxes : bool
         It keeps ``problem.margin`` whatever that costs. Where nothing is feasible, the search asks again
-        with the smaller margins of ``repair.relax``.
+        with another acceleration in ``problem.start``, as brakes may jump, and with the smaller margins of
+        ``repair.relax``.
     keeps_hull : bool
         Its curves keep limits and margin at every time, by the hull of their control points, and the
         residual ``obstacles`` says how far they are from it.

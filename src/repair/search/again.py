@@ -17,7 +17,7 @@ from repair.search.result import Probe
 __all__ = ["Notches", "other_ways", "probe_again", "probe_begun", "too_close"]
 
 _LITTLE = 0.5  # a smaller jump of the acceleration gains too little [m/s²]
-_GAINED = 1.5  # more than this is never gained by a jump along the path [m]
+_GAINED = 1.5  # who misses more along the path hardly ever passes by a jump [m]
 
 #: What is tightened, and the reasons it answers.
 _ANSWERS = (
